@@ -1,0 +1,540 @@
+//! Convex planar polygons of three or four vertices: area, normal, parts, clipping, crossing.
+//!
+//! The front of a polygon is where its vertices run counter-clockwise; lengths are in metres.
+//! Vector area (Newell): `N = 1/2 sum_i (v_i - v_0) x (v_i+1 - v_0)`, area `|N|`, normal `N / |N|`.
+//! Parameters: a quad is the bilinear patch `P(s, t)` with `s` along `v0 -> v1` and `t` along
+//! `v0 -> v3`; a triangle is `P(s, t) = v0 + s (v1 - v0) + t (v2 - v0)` with `s + t <= 1`.
+//! Tolerances are a few roundings of the coordinates at hand, never a fixed length: a scene in
+//! micrometres and one in kilometres behave alike.
+
+use core::fmt;
+
+use glam::{Vec2, Vec3};
+use heapless::Vec;
+
+use crate::math;
+
+/// Most vertices that a polygon may have.
+pub const MAX_VERTICES: usize = 4;
+
+/// A polygon that was clipped by a plane or two.
+pub type Clipped = Vec<Vec3, 8>;
+
+/// Roundings that a point's coordinates may carry when its side of a plane is decided.
+const ROUNDINGS: f32 = 8.0 * f32::EPSILON;
+
+/// How far a vertex may lie off its polygon's plane, in longest edges: what files written with
+/// six digits need, and small beside every other error of a bake.
+const PLANARITY: f32 = 1e-4;
+
+/// Why some vertices are no polygon.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum PolygonError {
+    /// Fewer than three or more than four vertices.
+    VertexCount,
+    /// A coordinate is NaN, infinite, or so large that areas overflow.
+    NotFinite,
+    /// The area is zero to within rounding.
+    ZeroArea,
+    /// A vertex lies off the plane of the others.
+    NonPlanar,
+    /// The outline turns the wrong way at a vertex, or crosses itself.
+    Concave,
+}
+
+impl fmt::Display for PolygonError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::VertexCount => "a polygon has three or four vertices",
+            Self::NotFinite => "a coordinate is not a finite number (or its square overflows)",
+            Self::ZeroArea => "the area is zero",
+            Self::NonPlanar => "the vertices do not lie in one plane",
+            Self::Concave => "the polygon is not convex",
+        })
+    }
+}
+
+impl core::error::Error for PolygonError {}
+
+/// A convex planar polygon of three or four vertices.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Polygon {
+    vertices: [Vec3; MAX_VERTICES],
+    count: u8,
+    normal: Vec3,
+    area: f32,
+    flatness: f32,
+}
+
+impl Polygon {
+    /// Checks the vertices and measures them.
+    ///
+    /// # Errors
+    /// What makes them unusable: see [`PolygonError`].
+    pub fn new(vertices: &[Vec3]) -> Result<Self, PolygonError> {
+        let corners = match *vertices {
+            [a, b, c] => [a, b, c, c],
+            [a, b, c, d] => [a, b, c, d],
+            _ => return Err(PolygonError::VertexCount),
+        };
+        let vector_area = vector_area(vertices);
+        let longest = longest_edge(vertices);
+        let square = longest * longest;
+        if !vertices.iter().all(|v| v.is_finite()) || !square.is_finite() {
+            return Err(PolygonError::NotFinite);
+        }
+
+        // The area must stand out of the rounding of the cross products.
+        let area = vector_area.length();
+        if area <= square * ROUNDINGS || area < f32::MIN_POSITIVE {
+            return Err(PolygonError::ZeroArea);
+        }
+        let normal = vector_area / area;
+
+        let [origin, ..] = corners;
+        let flatness = vertices
+            .iter()
+            .map(|v| (*v - origin).dot(normal).abs())
+            .fold(0.0, f32::max);
+        if flatness > PLANARITY * longest {
+            return Err(PolygonError::NonPlanar);
+        }
+        let polygon = Self {
+            vertices: corners,
+            count: if vertices.len() == 3 { 3 } else { 4 },
+            normal,
+            area,
+            flatness,
+        };
+        if !polygon.is_convex() {
+            return Err(PolygonError::Concave);
+        }
+        Ok(polygon)
+    }
+
+    /// Every corner turns left, and no corner sees another one on its right.
+    fn is_convex(&self) -> bool {
+        self.edges().all(|(a, b)| {
+            let edge = b - a;
+            let tolerance = ROUNDINGS * edge.length_squared();
+            self.vertices().iter().all(|v| {
+                let side = edge.cross(*v - a).dot(self.normal);
+                side >= -tolerance - edge.length() * self.flatness
+            })
+        })
+    }
+
+    /// The vertices, counter-clockwise seen from the front.
+    #[must_use]
+    pub fn vertices(&self) -> &[Vec3] {
+        let [head @ .., _] = &self.vertices;
+        if self.count == 3 {
+            head
+        } else {
+            &self.vertices
+        }
+    }
+
+    /// The edges `(from, to)` in order.
+    pub fn edges(&self) -> impl Iterator<Item = (Vec3, Vec3)> + '_ {
+        let vertices = self.vertices();
+        let next = vertices.iter().cycle().skip(1);
+        vertices.iter().copied().zip(next.copied())
+    }
+
+    /// True for three vertices.
+    #[must_use]
+    pub const fn is_triangle(&self) -> bool {
+        self.count == 3
+    }
+
+    /// Unit normal of the front.
+    #[must_use]
+    pub const fn normal(&self) -> Vec3 {
+        self.normal
+    }
+
+    /// Area in m2, above zero.
+    #[must_use]
+    pub const fn area(&self) -> f32 {
+        self.area
+    }
+
+    /// The first vertex.
+    #[must_use]
+    pub const fn origin(&self) -> Vec3 {
+        let [origin, ..] = self.vertices;
+        origin
+    }
+
+    /// Mean of the vertices: the centroid of triangles and parallelograms, inside in any case.
+    #[must_use]
+    pub fn center(&self) -> Vec3 {
+        let vertices = self.vertices();
+        let offset: Vec3 = vertices.iter().map(|v| *v - self.origin()).sum();
+        self.origin() + offset / vertices.len() as f32
+    }
+
+    /// Length of the longest edge or diagonal from the first vertex.
+    #[must_use]
+    pub fn diameter(&self) -> f32 {
+        let [a, b, c, d] = self.vertices;
+        (c - a).length().max((d - b).length())
+    }
+
+    /// Length of the longest edge.
+    #[must_use]
+    pub fn longest_edge(&self) -> f32 {
+        longest_edge(self.vertices())
+    }
+
+    /// The same polygon seen from behind: same first vertex, other winding.
+    #[must_use]
+    pub fn flipped(&self) -> Self {
+        let [a, b, c, d] = self.vertices;
+        let vertices = if self.count == 3 {
+            [a, c, b, b]
+        } else {
+            [a, d, c, b]
+        };
+        Self {
+            vertices,
+            normal: -self.normal,
+            ..*self
+        }
+    }
+
+    /// The point with the parameters `at = (s, t)`.
+    #[must_use]
+    pub fn point(&self, at: Vec2) -> Vec3 {
+        let [a, b, c, d] = self.vertices;
+        let along_s = (b - a) * at.x;
+        if self.count == 3 {
+            return a + along_s + (c - a) * at.y;
+        }
+        a + along_s + (d - a) * at.y + ((c - d) - (b - a)) * (at.x * at.y)
+    }
+
+    /// Area per unit of parameter area at `at`, in m2 (constant on triangles and parallelograms).
+    #[must_use]
+    pub fn density(&self, at: Vec2) -> f32 {
+        let [a, b, c, d] = self.vertices;
+        let (along_s, along_t) = if self.count == 3 {
+            (b - a, c - a)
+        } else {
+            let twist = (c - d) - (b - a);
+            ((b - a) + twist * at.y, (d - a) + twist * at.x)
+        };
+        along_s.cross(along_t).length()
+    }
+
+    /// The parameters of the point of the polygon's plane nearest to `p`.
+    ///
+    /// Exact on triangles and parallelograms; on other quads Newton's method on the bilinear map,
+    /// which converges from the middle for convex quads.
+    #[must_use]
+    pub fn parameters(&self, p: Vec3) -> Vec2 {
+        let [a, b, c, d] = self.vertices;
+        let mut at = Vec2::splat(1.0 / 3.0);
+        let far = if self.count == 3 { c } else { d };
+        let steps = if self.count == 3 { 1 } else { 8 };
+        for _ in 0..steps {
+            let twist = if self.count == 3 {
+                Vec3::ZERO
+            } else {
+                (c - d) - (b - a)
+            };
+            let along_s = (b - a) + twist * at.y;
+            let along_t = (far - a) + twist * at.x;
+            let miss = p - self.point(at);
+            let jacobian = along_s.cross(along_t).dot(self.normal);
+            if jacobian <= 0.0 {
+                break;
+            }
+            at += Vec2::new(
+                miss.cross(along_t).dot(self.normal),
+                along_s.cross(miss).dot(self.normal),
+            ) / jacobian;
+        }
+        at
+    }
+
+    /// The part between two corners of the parameter domain.
+    ///
+    /// On a quad it is the quad over the rectangle from `from` to `to`. On a triangle it is the
+    /// triangle with the right angle of its parameters at `from`, similar to the whole; `to`
+    /// below `from` gives the one that points the other way. Winding and plane are the whole's.
+    #[must_use]
+    pub fn part(&self, from: Vec2, to: Vec2) -> Self {
+        let [a, b, d] = [
+            self.point(from),
+            self.point(Vec2::new(to.x, from.y)),
+            self.point(Vec2::new(from.x, to.y)),
+        ];
+        let vertices = if self.count == 3 {
+            [a, b, d, d]
+        } else {
+            [a, b, self.point(to), d]
+        };
+        let mut part = Self { vertices, ..*self };
+        part.area = vector_area(part.vertices()).dot(self.normal).abs();
+        part
+    }
+
+    /// Signed distance of `p` to the plane, and the distance within which it counts as zero.
+    #[must_use]
+    pub fn height(&self, p: Vec3) -> (f32, f32) {
+        let origin = self.origin();
+        let height = (p - origin).dot(self.normal);
+        let magnitude = p.abs().max_element() + origin.abs().max_element();
+        (height, self.flatness + ROUNDINGS * magnitude)
+    }
+
+    /// Where the open segment from `from` to `to` crosses the polygon, as a fraction of its
+    /// length; `None` when it does not.
+    ///
+    /// An end that lies in the plane (to within rounding) does not cross it, so a surface never
+    /// hides its own points. The outline belongs to the polygon, so edge to edge there is no crack.
+    #[must_use]
+    pub fn crossing(&self, from: Vec3, to: Vec3) -> Option<f32> {
+        let (from_height, from_tolerance) = self.height(from);
+        let (to_height, to_tolerance) = self.height(to);
+        let starts_in_front = from_height > from_tolerance && to_height < -to_tolerance;
+        let starts_behind = from_height < -from_tolerance && to_height > to_tolerance;
+        if !starts_in_front && !starts_behind {
+            return None;
+        }
+
+        let fraction = from_height / (from_height - to_height);
+        let crossing = from + (to - from) * fraction;
+        let tolerance = from_tolerance.max(to_tolerance);
+        self.edges()
+            .all(|(a, b)| {
+                let edge = b - a;
+                edge.cross(crossing - a).dot(self.normal) >= -tolerance * edge.length()
+            })
+            .then_some(fraction)
+    }
+}
+
+/// `1/2 sum_i (v_i - v_0) x (v_i+1 - v_0)`: the normal, as long as the area.
+fn vector_area(vertices: &[Vec3]) -> Vec3 {
+    let Some((origin, rest)) = vertices.split_first() else {
+        return Vec3::ZERO;
+    };
+    let fan = rest.iter().zip(rest.iter().skip(1));
+    fan.map(|(b, c)| (*b - *origin).cross(*c - *origin) * 0.5)
+        .sum()
+}
+
+fn longest_edge(vertices: &[Vec3]) -> f32 {
+    let next = vertices.iter().cycle().skip(1);
+    vertices
+        .iter()
+        .zip(next)
+        .map(|(a, b)| (*b - *a).length())
+        .fold(0.0, f32::max)
+}
+
+/// The part of a convex outline where `height` is not negative; empty when nothing is left.
+///
+/// `height` must be linear (a signed distance to a plane). Outlines of more than seven vertices
+/// lose what does not fit into [`Clipped`].
+#[must_use]
+pub fn clip(outline: &[Vec3], height: impl Fn(Vec3) -> f32) -> Clipped {
+    let mut clipped = Clipped::new();
+    let next = outline.iter().cycle().skip(1);
+    for (&a, &b) in outline.iter().zip(next) {
+        let (height_a, height_b) = (height(a), height(b));
+        if height_a >= 0.0 {
+            let _ = clipped.push(a);
+        }
+        if (height_a > 0.0 && height_b < 0.0) || (height_a < 0.0 && height_b > 0.0) {
+            let _ = clipped.push(a + (b - a) * (height_a / (height_a - height_b)));
+        }
+    }
+    if clipped.len() < 3 {
+        clipped.clear();
+    }
+    clipped
+}
+
+/// A point on a polygon and the share of the polygon's area that it stands for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SamplePoint {
+    /// The place.
+    pub position: Vec3,
+    /// Share of the area; the weights of one set sum to one.
+    pub weight: f32,
+}
+
+/// Gauss points of a polygon: 2 x 2 on quads (exact for bicubic functions of a parallelogram),
+/// three on triangles (exact for quadratics).
+#[must_use]
+pub fn gauss_points(polygon: &Polygon) -> Vec<SamplePoint, 4> {
+    /// (1 - 1/sqrt 3) / 2
+    const LOW: f32 = 0.211_324_87;
+    const HIGH: f32 = 1.0 - LOW;
+    const QUAD: [Vec2; 4] = [
+        Vec2::new(LOW, LOW),
+        Vec2::new(HIGH, LOW),
+        Vec2::new(LOW, HIGH),
+        Vec2::new(HIGH, HIGH),
+    ];
+    const TRIANGLE: [Vec2; 3] = [
+        Vec2::new(1.0 / 6.0, 1.0 / 6.0),
+        Vec2::new(2.0 / 3.0, 1.0 / 6.0),
+        Vec2::new(1.0 / 6.0, 2.0 / 3.0),
+    ];
+    let parameters: &[Vec2] = if polygon.is_triangle() {
+        &TRIANGLE
+    } else {
+        &QUAD
+    };
+    let total: f32 = parameters.iter().map(|at| polygon.density(*at)).sum();
+    parameters
+        .iter()
+        .map(|at| SamplePoint {
+            position: polygon.point(*at),
+            weight: polygon.density(*at) / total,
+        })
+        .collect()
+}
+
+/// Maps the unit square to the polygon so that equal areas stay equal on triangles and
+/// parallelograms; on other quads [`Polygon::density`] tells by how much they do not.
+#[must_use]
+pub fn from_unit_square(polygon: &Polygon, at: Vec2) -> (Vec3, f32) {
+    if !polygon.is_triangle() {
+        return (polygon.point(at), polygon.density(at));
+    }
+    let root = math::safe_sqrt(at.x);
+    let parameters = Vec2::new(root * (1.0 - at.y), root * at.y);
+    (polygon.point(parameters), 2.0 * polygon.area())
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+
+    const SQUARE: [Vec3; 4] = [
+        Vec3::new(0.0, 0.0, 0.0),
+        Vec3::new(1.0, 0.0, 0.0),
+        Vec3::new(1.0, 1.0, 0.0),
+        Vec3::new(0.0, 1.0, 0.0),
+    ];
+
+    #[test]
+    fn area_normal_and_center_of_a_square() {
+        let square = Polygon::new(&SQUARE).unwrap();
+        assert_eq!(square.area(), 1.0);
+        assert_eq!(square.normal(), Vec3::Z);
+        assert_eq!(square.center(), Vec3::new(0.5, 0.5, 0.0));
+        assert_eq!(square.flipped().normal(), -Vec3::Z);
+        assert_eq!(Polygon::new(square.flipped().vertices()).unwrap().normal(), -Vec3::Z);
+    }
+
+    #[test]
+    fn every_illegal_polygon_has_its_own_error() {
+        let [a, b, c, d] = SQUARE;
+        let cases: [(&[Vec3], PolygonError); 8] = [
+            (&[a, b], PolygonError::VertexCount),
+            (&[a, b, c, d, a], PolygonError::VertexCount),
+            (&[a, b, Vec3::splat(f32::NAN)], PolygonError::NotFinite),
+            (&[a, b, Vec3::splat(1e30)], PolygonError::NotFinite),
+            (&[a, b, b], PolygonError::ZeroArea),
+            (&[a, b, c, d + Vec3::Z * 0.01], PolygonError::NonPlanar),
+            (&[a, b, Vec3::new(0.1, 0.1, 0.0), d], PolygonError::Concave),
+            (&[a, c, b, d], PolygonError::ZeroArea),
+        ];
+        for (vertices, error) in cases {
+            assert_eq!(Polygon::new(vertices), Err(error), "{vertices:?}");
+        }
+    }
+
+    #[test]
+    fn a_polygon_of_any_scale_and_place_is_legal() {
+        for scale in [1e-6_f32, 1e-3, 1.0, 1e3, 1e6] {
+            for offset in [0.0, 100.0] {
+                let moved = SQUARE.map(|v| (v + Vec3::splat(offset)) * scale);
+                let polygon = Polygon::new(&moved).unwrap();
+                let expected = scale * scale;
+                assert!((polygon.area() / expected - 1.0).abs() < 1e-4, "{scale} {offset}");
+            }
+        }
+    }
+
+    #[test]
+    fn parts_tile_the_whole() {
+        let skewed = [
+            Vec3::ZERO,
+            Vec3::new(2.0, 0.1, 0.0),
+            Vec3::new(1.7, 1.2, 0.0),
+            Vec3::new(-0.3, 0.9, 0.0),
+        ];
+        let quad = Polygon::new(&skewed).unwrap();
+        let mut sum = 0.0;
+        for i in 0..4 {
+            for j in 0..3 {
+                let from = Vec2::new(i as f32 / 4.0, j as f32 / 3.0);
+                sum += quad.part(from, from + Vec2::new(0.25, 1.0 / 3.0)).area();
+            }
+        }
+        assert!((sum - quad.area()).abs() < 1e-5, "{sum} {}", quad.area());
+
+        let triangle = Polygon::new(&skewed[..3]).unwrap();
+        let up = triangle.part(Vec2::ZERO, Vec2::splat(0.5)).area();
+        let down = triangle.part(Vec2::splat(0.5), Vec2::ZERO).area();
+        assert!((3.0 * up + down - triangle.area()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn parameters_invert_the_map() {
+        let quad = Polygon::new(&[
+            Vec3::ZERO,
+            Vec3::new(2.0, 0.1, 0.0),
+            Vec3::new(1.4, 1.2, 0.0),
+            Vec3::new(0.3, 0.9, 0.0),
+        ])
+        .unwrap();
+        for at in [Vec2::new(0.1, 0.9), Vec2::new(0.5, 0.5), Vec2::new(1.0, 0.0)] {
+            let back = quad.parameters(quad.point(at));
+            assert!((back - at).length() < 1e-5, "{at} {back}");
+        }
+    }
+
+    #[test]
+    fn crossing_ignores_ends_in_the_plane_and_closes_edges() {
+        let square = Polygon::new(&SQUARE).unwrap();
+        let above = Vec3::new(0.5, 0.5, 1.0);
+        let inside = Vec3::new(0.5, 0.5, 0.0);
+        assert_eq!(square.crossing(above, inside), None);
+        assert_eq!(square.crossing(inside, above), None);
+        assert_eq!(square.crossing(above, Vec3::new(0.5, 0.5, -1.0)), Some(0.5));
+        assert_eq!(square.crossing(above, Vec3::new(3.0, 0.5, -1.0)), None);
+
+        // Straight through the common edge of two squares: one of them stops it.
+        let neighbour = Polygon::new(&SQUARE.map(|v| v + Vec3::X)).unwrap();
+        let (from, to) = (Vec3::new(0.7, 0.3, 0.4), Vec3::new(1.3, 0.3, -0.4));
+        assert!(square.crossing(from, to).is_some() || neighbour.crossing(from, to).is_some());
+    }
+
+    #[test]
+    fn clipping_keeps_the_front_part() {
+        let clipped = clip(&SQUARE, |v| v.x - 0.25);
+        let area = vector_area(&clipped).length();
+        assert!((area - 0.75).abs() < 1e-6);
+        assert!(clip(&SQUARE, |v| v.x - 2.0).is_empty());
+    }
+
+    #[test]
+    fn gauss_weights_sum_to_one() {
+        for vertices in [&SQUARE[..], &SQUARE[..3]] {
+            let polygon = Polygon::new(vertices).unwrap();
+            let total: f32 = gauss_points(&polygon).iter().map(|p| p.weight).sum();
+            assert!((total - 1.0).abs() < 1e-6);
+        }
+    }
+}
