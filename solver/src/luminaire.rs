@@ -1,0 +1,266 @@
+//! Direct irradiance of point, spot, sun and sky at an element.
+//!
+//! Point and spot: `E = I(a) cos b / r^2`, intensity `I` in W/sr, 1 on the axis at unit emission.
+//! Sun: `E = cos b` averaged over its disc. Sky: `E = 1/pi` times the cosine-weighted solid angle
+//! that escapes, estimated by 64 stratified directions for each receiver point. All are averaged
+//! over the Gauss points of the element and multiplied by visibility.
+//!
+//! Spot falloff: KHR_lights_punctual (Khronos 2018, "Inner and Outer Cone Angles"), or linear.
+
+use core::f32::consts::TAU;
+
+use glam::Vec3;
+
+use crate::geometry::{Polygon, gauss_points};
+use crate::math;
+use crate::mesh::Mesh;
+use crate::scene::{Falloff, Luminaire, Scene, Source};
+use crate::visibility::Visibility;
+
+/// Strata along each side of the sky's square of directions.
+const SKY_STRATA: u32 = 8;
+/// Strata along each side of the sun's disc.
+const SUN_STRATA: u32 = 2;
+
+/// Irradiance of one receiver at unit emission, averaged over its area, W/m2.
+///
+/// `far` is a distance at which every surface has been passed, in m.
+#[must_use]
+pub fn irradiance(
+    source: &Source,
+    receiver: &Polygon,
+    far: f32,
+    visibility: &impl Visibility,
+) -> f32 {
+    gauss_points(receiver)
+        .iter()
+        .zip(0..)
+        .map(|(point, index)| {
+            let at = Receiver {
+                position: point.position,
+                normal: receiver.normal(),
+                rotation: TAU / 4.0 * index as f32 / SKY_STRATA as f32,
+            };
+            point.weight * at.irradiance(source, far, visibility)
+        })
+        .sum()
+}
+
+/// A point that receives, and by how much its directions are turned against its neighbours'.
+struct Receiver {
+    position: Vec3,
+    normal: Vec3,
+    rotation: f32,
+}
+
+impl Receiver {
+    fn irradiance(&self, source: &Source, far: f32, visibility: &impl Visibility) -> f32 {
+        match *source {
+            Source::Point { position } => self.from_point(position, visibility),
+            Source::Spot {
+                position,
+                direction,
+                inner,
+                outer,
+                falloff,
+            } => {
+                let Some(towards) = (self.position - position).try_normalize() else {
+                    return 0.0;
+                };
+                let angle = math::safe_acos(towards.dot(direction));
+                let intensity = spot_intensity(angle, inner, outer, falloff);
+                if intensity <= 0.0 {
+                    return 0.0;
+                }
+                intensity * self.from_point(position, visibility)
+            }
+            Source::Sun { direction, angle } => self.from_sun(direction, angle, far, visibility),
+            Source::Sky => self.from_sky(far, visibility),
+        }
+    }
+
+    /// `cos b / r^2`; 0 at the light's own place, where it has no meaning.
+    fn from_point(&self, position: Vec3, visibility: &impl Visibility) -> f32 {
+        let ray = position - self.position;
+        let square = ray.length_squared();
+        let cosine = ray.dot(self.normal) / math::safe_sqrt(square);
+        let irradiance = cosine / square;
+        if cosine > 0.0 && irradiance.is_finite() && visibility.sees(self.position, position) {
+            irradiance
+        } else {
+            0.0
+        }
+    }
+
+    fn from_sun(
+        &self,
+        direction: Vec3,
+        angle: f32,
+        far: f32,
+        visibility: &impl Visibility,
+    ) -> f32 {
+        let towards = -direction;
+        if angle <= 0.0 {
+            return self.escaping(towards, far, visibility) * towards.dot(self.normal).max(0.0);
+        }
+        let (u, v) = towards.any_orthonormal_pair();
+        let radius = math::tan(angle / 2.0);
+        let count = (SUN_STRATA * SUN_STRATA) as f32;
+        strata(SUN_STRATA, self.rotation)
+            .map(|(x, y)| {
+                let ray = (towards + (u * x + v * y) * radius).normalize();
+                self.escaping(ray, far, visibility) * ray.dot(self.normal).max(0.0) / count
+            })
+            .sum()
+    }
+
+    fn from_sky(&self, far: f32, visibility: &impl Visibility) -> f32 {
+        let (u, v) = self.normal.any_orthonormal_pair();
+        let count = (SKY_STRATA * SKY_STRATA) as f32;
+        strata(SKY_STRATA, self.rotation)
+            .map(|(x, y)| {
+                // Malley's method: the disc lifted to the hemisphere is cosine-weighted.
+                let height = math::safe_sqrt(1.0 - x * x - y * y);
+                let ray = u * x + v * y + self.normal * height;
+                self.escaping(ray, far, visibility) / count
+            })
+            .sum()
+    }
+
+    /// 1 when nothing stands in this direction and it is above the horizon, else 0.
+    fn escaping(&self, ray: Vec3, far: f32, visibility: &impl Visibility) -> f32 {
+        let above = ray.dot(self.normal) > 0.0;
+        let open = above && visibility.sees(self.position, self.position + ray * far);
+        f32::from(u8::from(open))
+    }
+}
+
+/// Centres of equal-area cells of the unit disc, turned by `rotation`.
+fn strata(side: u32, rotation: f32) -> impl Iterator<Item = (f32, f32)> {
+    let centre = move |i: u32| (i as f32 + 0.5) / side as f32;
+    (0..side).flat_map(move |i| {
+        (0..side).map(move |j| {
+            let radius = math::safe_sqrt(centre(i));
+            let angle = TAU * centre(j) + rotation;
+            (radius * math::cos(angle), radius * math::sin(angle))
+        })
+    })
+}
+
+/// Intensity at `angle` from the axis, in [0, 1].
+fn spot_intensity(angle: f32, inner: f32, outer: f32, falloff: Falloff) -> f32 {
+    if angle >= outer {
+        return 0.0;
+    }
+    if angle <= inner {
+        return 1.0;
+    }
+    match falloff {
+        Falloff::Linear => (outer - angle) / (outer - inner),
+        Falloff::Smooth => {
+            let edge = math::cos(outer);
+            let course = (math::cos(angle) - edge) / (math::cos(inner) - edge);
+            let course = course.clamp(0.0, 1.0);
+            course * course
+        }
+    }
+}
+
+/// Distance at which every surface of the scene has been passed from any point on one, in m.
+#[must_use]
+pub fn far(scene: &Scene) -> f32 {
+    2.0 * scene.diagonal()
+}
+
+/// Fills `row[j]` with the direct irradiance of element `first + j`, W/m2 at unit emission.
+///
+/// The luminaire's share is not applied. Elements beyond the mesh get 0.
+pub fn fill(
+    mesh: &Mesh,
+    luminaire: &Luminaire,
+    far: f32,
+    first: u32,
+    visibility: &impl Visibility,
+    row: &mut [f32],
+) {
+    let elements = mesh.elements.get(first as usize..).unwrap_or_default();
+    row.fill(0.0);
+    for (value, element) in row.iter_mut().zip(elements) {
+        if let Some(receiver) = mesh.element_polygon(element) {
+            *value = irradiance(luminaire.source(), &receiver, far, visibility);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use crate::color::Rgb;
+    use crate::scene::Surface;
+    use crate::visibility::Occluders;
+    use std::vec::Vec;
+
+    fn square(size: f32, z: f32) -> [Vec3; 4] {
+        [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+            .map(|(x, y)| Vec3::new(x * size, y * size, z))
+    }
+
+    fn receiver() -> Polygon {
+        Polygon::new(&square(0.01, 0.0)).unwrap()
+    }
+
+    fn at_origin(source: &Source, blockers: &[Surface]) -> f32 {
+        irradiance(source, &receiver(), 100.0, &Occluders(blockers))
+    }
+
+    #[test]
+    fn a_point_light_follows_the_inverse_square() {
+        for height in [0.5_f32, 1.0, 4.0] {
+            let source = Source::Point {
+                position: Vec3::Z * height,
+            };
+            let found = at_origin(&source, &[]);
+            assert!((found * height * height - 1.0).abs() < 1e-3, "{height} {found}");
+        }
+        let behind = Source::Point { position: -Vec3::Z };
+        assert_eq!(at_origin(&behind, &[]), 0.0);
+        let touching = Source::Point {
+            position: Vec3::ZERO,
+        };
+        assert_eq!(at_origin(&touching, &[]), 0.0);
+    }
+
+    #[test]
+    fn spot_courses_start_at_one_and_end_at_zero() {
+        for falloff in [Falloff::Smooth, Falloff::Linear] {
+            let course: Vec<f32> = (0..=10)
+                .map(|i| spot_intensity(0.2 + 0.03 * i as f32, 0.2, 0.5, falloff))
+                .collect();
+            assert_eq!((course[0], course[10]), (1.0, 0.0), "{falloff:?}");
+            assert!(course.is_sorted_by(|a, b| a > b), "{falloff:?} {course:?}");
+        }
+        assert!((spot_intensity(0.35, 0.2, 0.5, Falloff::Linear) - 0.5).abs() < 1e-6);
+        assert_eq!(spot_intensity(0.3, 0.3, 0.3, Falloff::Smooth), 0.0);
+    }
+
+    #[test]
+    fn sun_and_sky_give_one_to_a_surface_that_faces_them() {
+        for angle in [0.0, 0.0093] {
+            let sun = Source::Sun {
+                direction: -Vec3::Z,
+                angle,
+            };
+            assert!((at_origin(&sun, &[]) - 1.0).abs() < 1e-4);
+        }
+        assert!((at_origin(&Source::Sky, &[]) - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_plate_overhead_shades_the_sky_by_its_form_factor() {
+        let plate = Surface::new(0, &square(1.0, 1.0), Rgb::BLACK).unwrap();
+        // Four corner factors of a 1 x 1 square at distance 1 (Howell C-11): 0.5541.
+        let open = at_origin(&Source::Sky, &[plate]);
+        assert!((open - (1.0 - 0.5541)).abs() < 0.02, "{open}");
+    }
+}

@@ -1,0 +1,710 @@
+//! Tagged progressive refinement: pick a patch, shoot what it holds, keep every light apart.
+//!
+//! State: irradiance `E_jm` per element and light, unshot radiosity `dB_pm` per patch and light.
+//! A shot of patch `i` (Nielsen and Christensen 2002, Fig. 2, with the area ratio put right):
+//!
+//! `E_jm += F_ji dB_im` for every element `j` and light `m`,
+//! `dB_pm += sum_{j in p} A_j rho_j F_ji dB_im / A_p` for every patch `p`, `dB_im = 0`.
+//!
+//! The patch with the largest `sum_m w_m dB_im A_i` (summed over the channels) is next; `w_m` is
+//! the importance of the light. Residual of a light: `sum_i dB_im A_i` over the power that it
+//! emitted (area lights) or brought into the scene (luminaires); of the solution: the largest.
+//! Ambient term (Cohen et al. 1988, eq. 12), per light, as an irradiance:
+//! `a = g U / (1 - g rho)`, with the unshot power `U` over the whole area, the mean reflectance
+//! `rho`, and `g`, the share of the power shot so far that landed on elements (1 if all did).
+//!
+//! Lights come in blocks of `K` lanes; all blocks share one row. Rows that the caller hands in are
+//! kept as long as the row storage has room and are shot again without being evaluated again.
+
+use core::fmt;
+
+use crate::color::Rgb;
+use crate::mesh::Mesh;
+
+/// One value per channel and lane of a block of `K` lights.
+pub type Lanes<const K: usize> = [[f32; K]; 3];
+
+/// What refinement knows of a patch, besides its unshot radiosity.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PatchState {
+    /// Number of its row in the storage, plus one; 0 when the row is not known.
+    row: u32,
+    /// True once its own emission has been shot.
+    has_emitted: bool,
+    /// Reflected share of the row at hand: `sum_j A_j rho_j F_ji / A_p`.
+    gathered: Rgb,
+}
+
+impl PatchState {
+    /// Nothing known, nothing shot.
+    pub const EMPTY: Self = Self {
+        row: 0,
+        has_emitted: false,
+        gathered: Rgb::BLACK,
+    };
+}
+
+/// What refinement knows of a block of lights.
+#[derive(Clone, Copy, Debug)]
+pub struct Block<const K: usize> {
+    /// Power sent into the scene, summed over the channels, W.
+    emitted: [f32; K],
+    /// Weight in the choice of the next shooter.
+    importance: [f32; K],
+}
+
+impl<const K: usize> Block<K> {
+    /// Dark lights of importance one.
+    pub const EMPTY: Self = Self {
+        emitted: [0.0; K],
+        importance: [1.0; K],
+    };
+}
+
+/// Memory for one refinement, lent by the caller; contents are overwritten.
+///
+/// With `n` elements, `p` patches and `b` blocks: lanes are block-major, element or patch inside.
+#[derive(Debug)]
+pub struct Storage<'a, const K: usize> {
+    /// Irradiance, at least `n * b`.
+    pub irradiance: &'a mut [Lanes<K>],
+    /// The direct part of it, at least `n * b`; empty to not keep it apart.
+    pub direct: &'a mut [Lanes<K>],
+    /// Unshot radiosity, at least `p * b`.
+    pub unshot: &'a mut [Lanes<K>],
+    /// At least `p`.
+    pub patches: &'a mut [PatchState],
+    /// `b`: lights divided by `K`, rounded up.
+    pub blocks: &'a mut [Block<K>],
+    /// Kept rows, `n` floats each; as many as fit, possibly none.
+    pub rows: &'a mut [f32],
+}
+
+/// Storage of fixed capacity for one block of lights, fit for a `static`.
+///
+/// `ROWS` rows are kept; a row is as long as `ELEMENTS`.
+#[derive(Debug)]
+pub struct FixedStorage<
+    const K: usize,
+    const PATCHES: usize,
+    const ELEMENTS: usize,
+    const ROWS: usize,
+> {
+    irradiance: [Lanes<K>; ELEMENTS],
+    unshot: [Lanes<K>; PATCHES],
+    patches: [PatchState; PATCHES],
+    block: [Block<K>; 1],
+    rows: [[f32; ELEMENTS]; ROWS],
+}
+
+impl<const K: usize, const PATCHES: usize, const ELEMENTS: usize, const ROWS: usize>
+    FixedStorage<K, PATCHES, ELEMENTS, ROWS>
+{
+    /// Empty storage. No lights, no elements, or more patches than 16 bits name do not compile.
+    #[must_use]
+    pub const fn new() -> Self {
+        const {
+            assert!(K > 0, "a block holds at least one light");
+            assert!(ELEMENTS > 0, "there is at least one element");
+            assert!(PATCHES <= 65_536, "patch ids of a device are 16 bits wide");
+            assert!(ROWS <= PATCHES, "a patch has one row");
+        }
+        Self {
+            irradiance: [[[0.0; K]; 3]; ELEMENTS],
+            unshot: [[[0.0; K]; 3]; PATCHES],
+            patches: [PatchState::EMPTY; PATCHES],
+            block: [Block::EMPTY],
+            rows: [[0.0; ELEMENTS]; ROWS],
+        }
+    }
+
+    /// The storage as slices; direct light is not kept apart.
+    #[must_use]
+    pub const fn storage(&mut self) -> Storage<'_, K> {
+        Storage {
+            irradiance: &mut self.irradiance,
+            direct: &mut [],
+            unshot: &mut self.unshot,
+            patches: &mut self.patches,
+            blocks: &mut self.block,
+            rows: self.rows.as_flattened_mut(),
+        }
+    }
+}
+
+impl<const K: usize, const PATCHES: usize, const ELEMENTS: usize, const ROWS: usize> Default
+    for FixedStorage<K, PATCHES, ELEMENTS, ROWS>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Why a refinement cannot start or go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum RefineError {
+    /// More lights than the blocks hold.
+    TooManyLights {
+        /// Capacity of the storage.
+        limit: usize,
+    },
+    /// More elements than the storage holds.
+    TooManyElements {
+        /// Capacity of the storage.
+        limit: usize,
+    },
+    /// More patches than the storage holds.
+    TooManyPatches {
+        /// Capacity of the storage.
+        limit: usize,
+    },
+    /// The wanted residual is not a positive number.
+    Residual,
+    /// The importance of this light is not a positive finite number.
+    Importance {
+        /// Its tag.
+        light: u32,
+    },
+    /// There is no such patch or light.
+    Unknown,
+    /// A row does not have one factor in [0, 1] per element.
+    Row {
+        /// The first element whose factor is missing or illegal.
+        element: usize,
+    },
+}
+
+impl fmt::Display for RefineError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TooManyLights { limit } => {
+                write!(f, "more lights than the storage holds ({limit})")
+            }
+            Self::TooManyElements { limit } => {
+                write!(f, "more elements than the storage holds ({limit})")
+            }
+            Self::TooManyPatches { limit } => {
+                write!(f, "more patches than the storage holds ({limit})")
+            }
+            Self::Residual => f.write_str("the residual to reach must be a positive number"),
+            Self::Importance { light } => {
+                write!(f, "light {light}: the importance must be a positive number")
+            }
+            Self::Unknown => f.write_str("there is no such patch or light"),
+            Self::Row { element } => {
+                write!(f, "element {element}: no legal factor in this row")
+            }
+        }
+    }
+}
+
+impl core::error::Error for RefineError {}
+
+/// A refinement under way. Its state is usable after every shot.
+#[derive(Debug)]
+pub struct Refinement<'a, const K: usize> {
+    mesh: Mesh<'a>,
+    lights: u32,
+    residual: f32,
+    storage: Storage<'a, K>,
+    rows_kept: u32,
+    rows_evaluated: u32,
+    shots: u64,
+    /// Area shot so far, once per row, and how much of it landed on elements.
+    area_shot: f64,
+    area_landed: f64,
+}
+
+impl<'a, const K: usize> Refinement<'a, K> {
+    /// Starts with every emitting patch full and everything else dark.
+    ///
+    /// `residual` is the goal: [`Self::next_shooter`] ends below it. Luminaires follow by
+    /// [`Self::illuminate`], importances by [`Self::set_importance`].
+    ///
+    /// # Errors
+    /// Storage that is too small, by the name of its limit; a residual that is not positive.
+    pub fn new(
+        mesh: Mesh<'a>,
+        lights: u32,
+        residual: f32,
+        mut storage: Storage<'a, K>,
+    ) -> Result<Self, RefineError> {
+        const { assert!(K > 0, "a block holds at least one light") }
+        if residual.is_nan() || residual <= 0.0 {
+            return Err(RefineError::Residual);
+        }
+        fit(&mesh, lights, &mut storage)?;
+        storage.irradiance.fill([[0.0; K]; 3]);
+        storage.direct.fill([[0.0; K]; 3]);
+        storage.unshot.fill([[0.0; K]; 3]);
+        storage.patches.fill(PatchState::EMPTY);
+        storage.blocks.fill(Block::EMPTY);
+
+        let mut refinement = Self {
+            mesh,
+            lights,
+            residual,
+            storage,
+            rows_kept: 0,
+            rows_evaluated: 0,
+            shots: 0,
+            area_shot: 0.0,
+            area_landed: 0.0,
+        };
+        refinement.emit();
+        Ok(refinement)
+    }
+
+    /// Fills emitting patches with the exitance of their light.
+    fn emit(&mut self) {
+        for (patch, id) in self.mesh.patches.iter().zip(0..) {
+            let Some(emission) = self.mesh.patch_emission(id) else {
+                continue;
+            };
+            let (block, lane) = address::<K>(emission.light);
+            let count = self.mesh.patches.len();
+            if let Some(lanes) = self.storage.unshot.get_mut(block * count + id as usize) {
+                add_to_lane(lanes, lane, emission.share);
+            }
+            let power = sum(emission.share) * patch.area;
+            self.add_emitted(emission.light, power);
+        }
+    }
+
+    fn add_emitted(&mut self, light: u32, power: f32) {
+        let (block, lane) = address::<K>(light);
+        let block = self.storage.blocks.get_mut(block);
+        if let Some(emitted) = block.and_then(|b| b.emitted.get_mut(lane)) {
+            *emitted += power;
+        }
+    }
+
+    /// Sets the weight of a light in the choice of the next shooter; 1 by default.
+    ///
+    /// # Errors
+    /// A weight that is not positive and finite, or a light that does not exist.
+    pub fn set_importance(&mut self, light: u32, importance: f32) -> Result<(), RefineError> {
+        if !(importance > 0.0 && importance.is_finite()) {
+            return Err(RefineError::Importance { light });
+        }
+        let (block, lane) = address::<K>(light);
+        let block = self.storage.blocks.get_mut(block);
+        let weight = block.and_then(|b| b.importance.get_mut(lane));
+        *weight.ok_or(RefineError::Unknown)? = importance;
+        Ok(())
+    }
+
+    /// Adds the direct light of a luminaire: `row[j]` is its irradiance at unit emission.
+    ///
+    /// # Errors
+    /// [`RefineError::Unknown`] for a light that does not exist, [`RefineError::Row`] for a row
+    /// that is too short or not finite.
+    pub fn illuminate(&mut self, light: u32, share: Rgb, row: &[f32]) -> Result<(), RefineError> {
+        if light >= self.lights {
+            return Err(RefineError::Unknown);
+        }
+        self.check(row, f32::MAX)?;
+        self.gather(row);
+
+        let mut delta = [[0.0; K]; 3];
+        let (block, lane) = address::<K>(light);
+        add_to_lane(&mut delta, lane, share);
+        let n = self.mesh.elements.len();
+        distribute(part(self.storage.irradiance, block, n), row, &delta);
+        distribute(part(self.storage.direct, block, n), row, &delta);
+        self.reflect(block, &delta);
+
+        let arrived: f32 = row
+            .iter()
+            .zip(self.mesh.elements)
+            .map(|(value, element)| value * element.area)
+            .sum();
+        self.add_emitted(light, arrived * sum(share));
+        Ok(())
+    }
+
+    /// The patch to shoot next whose row is not known; `None` once the residual is reached.
+    ///
+    /// Patches whose row is known are shot on the way.
+    pub fn next_shooter(&mut self) -> Option<u32> {
+        loop {
+            let patch = self.brightest(|_| true)?;
+            if self.residual() <= self.residual {
+                return None;
+            }
+            if !self.shoot_known(patch) {
+                return Some(patch);
+            }
+        }
+    }
+
+    /// Shoots known rows until what they still hold is below the residual, or nothing is left.
+    ///
+    /// After an early stop this gives the best state that the rows seen so far allow.
+    pub fn finish(&mut self) {
+        let known = |state: &PatchState| state.row != 0;
+        while self.residual_of(known) > self.residual {
+            match self.brightest(known) {
+                Some(patch) if self.shoot_known(patch) => {}
+                _ => return,
+            }
+        }
+    }
+
+    /// Shoots all unshot radiosity of a patch along `row`, and keeps the row if there is room.
+    ///
+    /// # Errors
+    /// [`RefineError::Unknown`] for a patch that does not exist, [`RefineError::Row`] for a row
+    /// that is too short or has a factor outside [0, 1].
+    pub fn shoot(&mut self, patch: u32, row: &[f32]) -> Result<(), RefineError> {
+        if patch as usize >= self.mesh.patches.len() {
+            return Err(RefineError::Unknown);
+        }
+        self.check(row, 1.0)?;
+        self.rows_evaluated += 1;
+        self.note_landing(patch, row);
+        self.keep(patch, row);
+        self.distribute_all(patch, row);
+        Ok(())
+    }
+
+    /// Shoots a patch from the storage; false when its row is not there.
+    fn shoot_known(&mut self, patch: u32) -> bool {
+        let n = self.mesh.elements.len();
+        let state = self.storage.patches.get(patch as usize);
+        let Some(slot) = state.and_then(|s| (s.row as usize).checked_sub(1)) else {
+            return false;
+        };
+        // The row is borrowed apart from the rest of the state and put back afterwards.
+        let rows = core::mem::take(&mut self.storage.rows);
+        let row = rows.get(slot * n..).and_then(|tail| tail.get(..n));
+        let is_known = row.is_some();
+        if let Some(row) = row {
+            self.distribute_all(patch, row);
+        }
+        self.storage.rows = rows;
+        is_known
+    }
+
+    fn distribute_all(&mut self, patch: u32, row: &[f32]) {
+        self.gather(row);
+        self.shots += 1;
+        let (n, count) = (self.mesh.elements.len(), self.mesh.patches.len());
+        let first_shot = self.take_first_shot(patch);
+        for block in 0..self.storage.blocks.len() {
+            let unshot = self.storage.unshot.get_mut(block * count + patch as usize);
+            let Some(delta) = unshot.map(|lanes| core::mem::replace(lanes, [[0.0; K]; 3])) else {
+                continue;
+            };
+            if delta.as_flattened().iter().all(|value| *value == 0.0) {
+                continue;
+            }
+            distribute(part(self.storage.irradiance, block, n), row, &delta);
+            self.reflect(block, &delta);
+        }
+        if let Some((block, delta)) = first_shot {
+            distribute(part(self.storage.direct, block, n), row, &delta);
+        }
+    }
+
+    /// The emission of a patch that has not been shot yet, with its block.
+    fn take_first_shot(&mut self, patch: u32) -> Option<(usize, Lanes<K>)> {
+        let emission = self.mesh.patch_emission(patch)?;
+        let state = self.storage.patches.get_mut(patch as usize)?;
+        if core::mem::replace(&mut state.has_emitted, true) {
+            return None;
+        }
+        let (block, lane) = address::<K>(emission.light);
+        let mut delta = [[0.0; K]; 3];
+        add_to_lane(&mut delta, lane, emission.share);
+        Some((block, delta))
+    }
+
+    /// What share of a row each patch reflects, into the patch states.
+    fn gather(&mut self, row: &[f32]) {
+        let patches = &mut *self.storage.patches;
+        patches
+            .iter_mut()
+            .for_each(|state| state.gathered = Rgb::BLACK);
+        for (factor, element) in row.iter().zip(self.mesh.elements) {
+            if let Some(state) = patches.get_mut(element.patch as usize) {
+                state.gathered += element.reflectance * (factor * element.area);
+            }
+        }
+        for (state, patch) in patches.iter_mut().zip(self.mesh.patches) {
+            state.gathered = state.gathered * patch.area.recip();
+        }
+    }
+
+    /// Adds what the gathered shares of `delta` reflect to the unshot radiosity of a block.
+    fn reflect(&mut self, block: usize, delta: &Lanes<K>) {
+        let unshot = part(self.storage.unshot, block, self.mesh.patches.len());
+        for (lanes, state) in unshot.iter_mut().zip(self.storage.patches.iter()) {
+            let shares = state.gathered.to_array();
+            for ((channel, share), shot) in lanes.iter_mut().zip(shares).zip(delta) {
+                for (value, shot) in channel.iter_mut().zip(shot) {
+                    *value += share * shot;
+                }
+            }
+        }
+    }
+
+    fn keep(&mut self, patch: u32, row: &[f32]) {
+        let n = self.mesh.elements.len();
+        let start = self.rows_kept as usize * n;
+        let room = self.storage.rows.get_mut(start..);
+        let (Some(room), Some(row)) = (room.and_then(|r| r.get_mut(..n)), row.get(..n)) else {
+            return;
+        };
+        let Some(state) = self.storage.patches.get_mut(patch as usize) else {
+            return;
+        };
+        if state.row == 0 && n > 0 {
+            for (kept, factor) in room.iter_mut().zip(row) {
+                *kept = *factor;
+            }
+            self.rows_kept += 1;
+            state.row = self.rows_kept;
+        }
+    }
+
+    fn note_landing(&mut self, patch: u32, row: &[f32]) {
+        let Some(patch) = self.mesh.patches.get(patch as usize) else {
+            return;
+        };
+        self.area_shot += f64::from(patch.area);
+        self.area_landed += row
+            .iter()
+            .zip(self.mesh.elements)
+            .map(|(factor, element)| f64::from(factor * element.area))
+            .sum::<f64>();
+    }
+
+    fn check(&self, row: &[f32], largest: f32) -> Result<(), RefineError> {
+        let n = self.mesh.elements.len();
+        let illegal = row.iter().position(|f| !(0.0..=largest).contains(f));
+        match illegal {
+            Some(element) => Err(RefineError::Row { element }),
+            None if row.len() != n => Err(RefineError::Row {
+                element: row.len().min(n),
+            }),
+            None => Ok(()),
+        }
+    }
+
+    /// The patch with the largest weighted unshot power among those that `admit` lets pass;
+    /// `None` when none has any.
+    fn brightest(&self, admit: impl Fn(&PatchState) -> bool) -> Option<u32> {
+        let count = self.mesh.patches.len();
+        let mut best = (0.0, None);
+        let patches = self.mesh.patches.iter().zip(self.storage.patches.iter());
+        for ((patch, state), id) in patches.zip(0..) {
+            if !admit(state) {
+                continue;
+            }
+            let mut power = 0.0;
+            for (block, index) in self.storage.blocks.iter().zip(0..) {
+                if let Some(lanes) = self.storage.unshot.get(index * count + id as usize) {
+                    power += weighted(lanes, &block.importance);
+                }
+            }
+            if power * patch.area > best.0 {
+                best = (power * patch.area, Some(id));
+            }
+        }
+        best.1
+    }
+
+    /// The largest residual of all lights.
+    #[must_use]
+    pub fn residual(&self) -> f32 {
+        self.residual_of(|_| true)
+    }
+
+    fn residual_of(&self, admit: impl Fn(&PatchState) -> bool) -> f32 {
+        (0..self.storage.blocks.len())
+            .map(|block| {
+                let residuals = self.block_residuals(block, &admit);
+                residuals.iter().copied().fold(0.0, f32::max)
+            })
+            .fold(0.0, f32::max)
+    }
+
+    /// Residual of one light; 0 for a light that emits nothing or does not exist.
+    #[must_use]
+    pub fn light_residual(&self, light: u32) -> f32 {
+        let (block, lane) = address::<K>(light);
+        let residuals = self.block_residuals(block, |_| true);
+        residuals.get(lane).copied().unwrap_or(0.0)
+    }
+
+    fn block_residuals(&self, block: usize, admit: impl Fn(&PatchState) -> bool) -> [f32; K] {
+        let count = self.mesh.patches.len();
+        let mut power = [0.0; K];
+        let unshot = self.storage.unshot.get(block * count..).unwrap_or_default();
+        let patches = self.mesh.patches.iter().zip(self.storage.patches.iter());
+        for ((patch, state), [r, g, b]) in patches.zip(unshot) {
+            if admit(state) {
+                let channels = r.iter().zip(g).zip(b);
+                for (total, ((r, g), b)) in power.iter_mut().zip(channels) {
+                    *total += (r + g + b) * patch.area;
+                }
+            }
+        }
+        let emitted = self.storage.blocks.get(block).map(|b| b.emitted);
+        for (value, emitted) in power.iter_mut().zip(emitted.unwrap_or([0.0; K])) {
+            *value = if emitted > 0.0 { *value / emitted } else { 0.0 };
+        }
+        power
+    }
+
+    /// Ambient irradiance of a light: what its unshot power would add on average, W/m2.
+    #[must_use]
+    pub fn ambient(&self, light: u32) -> Rgb {
+        let count = self.mesh.patches.len();
+        let (block, lane) = address::<K>(light);
+        let unshot = self.storage.unshot.get(block * count..).unwrap_or_default();
+        let mut power = Rgb::BLACK;
+        for (patch, lanes) in self.mesh.patches.iter().zip(unshot) {
+            power += lane_of(lanes, lane) * patch.area;
+        }
+        let (mut area, mut reflecting) = (0.0, Rgb::BLACK);
+        for element in self.mesh.elements {
+            area += element.area;
+            reflecting += element.reflectance * element.area;
+        }
+        if area <= 0.0 || self.area_shot <= 0.0 {
+            return Rgb::BLACK;
+        }
+        let landing = (self.area_landed / self.area_shot) as f32;
+        let term = |power: f32, reflecting: f32| {
+            power / area * landing / (1.0 - landing * reflecting / area).max(f32::EPSILON)
+        };
+        Rgb::new(
+            term(power.r, reflecting.r),
+            term(power.g, reflecting.g),
+            term(power.b, reflecting.b),
+        )
+    }
+
+    /// Irradiance of an element by a light at unit emission, W/m2, without the ambient term.
+    #[must_use]
+    pub fn irradiance(&self, element: u32, light: u32) -> Rgb {
+        self.lookup(self.storage.irradiance, element, light)
+    }
+
+    /// The direct part of it; zero when direct light is not kept apart.
+    #[must_use]
+    pub fn direct(&self, element: u32, light: u32) -> Rgb {
+        self.lookup(self.storage.direct, element, light)
+    }
+
+    fn lookup(&self, lanes: &[Lanes<K>], element: u32, light: u32) -> Rgb {
+        let (block, lane) = address::<K>(light);
+        let index = block * self.mesh.elements.len() + element as usize;
+        lanes
+            .get(index)
+            .map_or(Rgb::BLACK, |lanes| lane_of(lanes, lane))
+    }
+
+    /// Rows handed in so far; without row storage a patch may count more than once.
+    #[must_use]
+    pub const fn rows_evaluated(&self) -> u32 {
+        self.rows_evaluated
+    }
+
+    /// Shots so far, those along known rows included.
+    #[must_use]
+    pub const fn shots(&self) -> u64 {
+        self.shots
+    }
+}
+
+/// Checks that every slice is long enough and cuts it to length.
+fn fit<const K: usize>(
+    mesh: &Mesh,
+    lights: u32,
+    storage: &mut Storage<'_, K>,
+) -> Result<(), RefineError> {
+    let blocks = (lights as usize).div_ceil(K.max(1));
+    if storage.blocks.len() < blocks {
+        return Err(RefineError::TooManyLights {
+            limit: storage.blocks.len() * K,
+        });
+    }
+    let (n, p) = (mesh.elements.len(), mesh.patches.len());
+    let (irradiance, direct) = (storage.irradiance.len(), storage.direct.len());
+    let elements = if direct == 0 {
+        irradiance
+    } else {
+        irradiance.min(direct)
+    };
+    let per_block = |length: usize| length.checked_div(blocks).unwrap_or(usize::MAX);
+    if per_block(elements) < n {
+        return Err(RefineError::TooManyElements {
+            limit: per_block(elements),
+        });
+    }
+    let patches = per_block(storage.unshot.len()).min(storage.patches.len());
+    if patches < p {
+        return Err(RefineError::TooManyPatches { limit: patches });
+    }
+    cut(&mut storage.blocks, blocks);
+    cut(&mut storage.patches, p);
+    Ok(())
+}
+
+fn cut<T>(slice: &mut &mut [T], length: usize) {
+    let whole = core::mem::take(slice);
+    *slice = whole.get_mut(..length).unwrap_or_default();
+}
+
+/// Block and lane of a light.
+const fn address<const K: usize>(light: u32) -> (usize, usize) {
+    const { assert!(K > 0, "a block holds at least one light") }
+    (light as usize / K, light as usize % K)
+}
+
+/// The lanes of one block.
+fn part<const K: usize>(lanes: &mut [Lanes<K>], block: usize, length: usize) -> &mut [Lanes<K>] {
+    let tail = lanes.get_mut(block * length..).unwrap_or_default();
+    let length = length.min(tail.len());
+    tail.get_mut(..length).unwrap_or_default()
+}
+
+/// `E_j += F_j delta` for every element of a block.
+fn distribute<const K: usize>(irradiance: &mut [Lanes<K>], row: &[f32], delta: &Lanes<K>) {
+    for (lanes, factor) in irradiance.iter_mut().zip(row) {
+        for (channel, shot) in lanes.iter_mut().zip(delta) {
+            for (value, shot) in channel.iter_mut().zip(shot) {
+                *value += factor * shot;
+            }
+        }
+    }
+}
+
+fn lane_of<const K: usize>([r, g, b]: &Lanes<K>, lane: usize) -> Rgb {
+    let value = |channel: &[f32; K]| channel.get(lane).copied().unwrap_or(0.0);
+    Rgb::new(value(r), value(g), value(b))
+}
+
+fn add_to_lane<const K: usize>(lanes: &mut Lanes<K>, lane: usize, value: Rgb) {
+    for (channel, value) in lanes.iter_mut().zip(value.to_array()) {
+        if let Some(slot) = channel.get_mut(lane) {
+            *slot += value;
+        }
+    }
+}
+
+fn weighted<const K: usize>([r, g, b]: &Lanes<K>, weights: &[f32; K]) -> f32 {
+    let channels = r.iter().zip(g).zip(b);
+    channels
+        .zip(weights)
+        .map(|(((r, g), b), weight)| (r + g + b) * weight)
+        .sum()
+}
+
+fn sum(value: Rgb) -> f32 {
+    value.r + value.g + value.b
+}
