@@ -258,8 +258,14 @@ mod tests {
         }
         for code in 0..u8::MAX {
             let (found, bound) = (worst[code as usize], error_bound(code));
-            assert!(found <= bound * (1.0 + 1e-4), "code {code}: {found} > {bound}");
-            assert!(found >= bound * 0.95, "code {code}: the bound {bound} is loose ({found})");
+            assert!(
+                found <= bound * (1.0 + 1e-4),
+                "code {code}: {found} > {bound}"
+            );
+            assert!(
+                found >= bound * 0.95,
+                "code {code}: the bound {bound} is loose ({found})"
+            );
         }
         assert_eq!(error_bound(255), f32::INFINITY);
     }
@@ -270,7 +276,10 @@ mod tests {
         for code in 0..=u8::MAX {
             let exact = decode(code) * one;
             let fixed = f32::from(decode_fixed(code));
-            assert!((exact - fixed).abs() <= 0.502, "code {code}: {exact} {fixed}");
+            assert!(
+                (exact - fixed).abs() <= 0.502,
+                "code {code}: {exact} {fixed}"
+            );
         }
     }
 

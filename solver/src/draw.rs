@@ -474,7 +474,9 @@ mod tests {
         assert_eq!(at(35, 34), Rgb888::BLUE, "below the lamp");
         let count = |wanted| {
             let pixels = (0..64 * 64).map(|i| Point::new(i % 64, i / 64));
-            pixels.filter(|p| display.get_pixel(*p) == Some(wanted)).count()
+            pixels
+                .filter(|p| display.get_pixel(*p) == Some(wanted))
+                .count()
         };
         assert_eq!(count(Rgb888::RED), 16 * 16);
         assert_eq!(count(Rgb888::GREEN), 8 * 4);
@@ -511,9 +513,8 @@ mod tests {
         let mut band = [Sample::new(Rgb888::BLACK); 640];
         let mesh = atlas.mesh().unwrap();
         paint(&mut display, &mesh, &away, Rgb888::BLACK, &mut band, color).unwrap();
-        let painted = (0..64 * 64).filter(|i| {
-            display.get_pixel(Point::new(i % 64, i / 64)) != Some(Rgb888::BLACK)
-        });
+        let painted = (0..64 * 64)
+            .filter(|i| display.get_pixel(Point::new(i % 64, i / 64)) != Some(Rgb888::BLACK));
         assert_eq!(painted.count(), 0);
     }
 }

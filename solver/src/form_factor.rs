@@ -87,12 +87,7 @@ impl Shooter {
         };
         Self {
             polygon,
-            samples: [
-                set(Vec2::ZERO),
-                set(Vec2::ONE),
-                set(Vec2::X),
-                set(Vec2::Y),
-            ],
+            samples: [set(Vec2::ZERO), set(Vec2::ONE), set(Vec2::X), set(Vec2::Y)],
         }
     }
 
@@ -107,18 +102,17 @@ impl Shooter {
             .iter()
             .zip(&self.samples)
             .map(|(point, samples)| {
-                let above = above_horizon(
-                    point.position,
-                    receiver.normal(),
-                    self.polygon.vertices(),
-                );
+                let above =
+                    above_horizon(point.position, receiver.normal(), self.polygon.vertices());
                 let open = lambert(receiver.normal(), &above);
                 if open <= 0.0 {
                     return 0.0;
                 }
                 let visible =
                     self.visible_share(point.position, receiver.normal(), samples, visibility);
-                point.weight * open * visible.unwrap_or_else(|| sees_middle(point.position, &above, visibility))
+                point.weight
+                    * open
+                    * visible.unwrap_or_else(|| sees_middle(point.position, &above, visibility))
             })
             .sum()
     }
@@ -250,7 +244,10 @@ mod tests {
         };
         let whole = point_to_polygon(Vec3::ZERO, Vec3::Z, &wall(-1.0));
         let above = point_to_polygon(Vec3::ZERO, Vec3::Z, &wall(0.0));
-        assert!((whole - above).abs() < 1e-6 && above > 0.1, "{whole} {above}");
+        assert!(
+            (whole - above).abs() < 1e-6 && above > 0.1,
+            "{whole} {above}"
+        );
     }
 
     #[test]
@@ -273,7 +270,10 @@ mod tests {
         ];
         for (shooter, receiver, low, high) in pairs {
             let factor = Shooter::new(shooter).form_factor(&receiver, &Open);
-            assert!((low..=high).contains(&factor), "{shooter:?} {receiver:?} {factor}");
+            assert!(
+                (low..=high).contains(&factor),
+                "{shooter:?} {receiver:?} {factor}"
+            );
         }
     }
 
@@ -286,7 +286,11 @@ mod tests {
                 let (u, v) = out.any_orthonormal_pair();
                 let corners = [out - u - v, out + u - v, out + u + v, out - u + v];
                 let wall = Polygon::new(&corners).unwrap();
-                if wall.normal().dot(out) > 0.0 { wall.flipped() } else { wall }
+                if wall.normal().dot(out) > 0.0 {
+                    wall.flipped()
+                } else {
+                    wall
+                }
             })
             .collect();
         let receiver = faces[0].part(Vec2::ZERO, Vec2::new(0.1, 0.7));

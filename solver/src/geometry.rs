@@ -433,7 +433,10 @@ mod tests {
         assert_eq!(square.normal(), Vec3::Z);
         assert_eq!(square.center(), Vec3::new(0.5, 0.5, 0.0));
         assert_eq!(square.flipped().normal(), -Vec3::Z);
-        assert_eq!(Polygon::new(square.flipped().vertices()).unwrap().normal(), -Vec3::Z);
+        assert_eq!(
+            Polygon::new(square.flipped().vertices()).unwrap().normal(),
+            -Vec3::Z
+        );
     }
 
     #[test]
@@ -461,7 +464,10 @@ mod tests {
                 let moved = SQUARE.map(|v| (v + Vec3::splat(offset)) * scale);
                 let polygon = Polygon::new(&moved).unwrap();
                 let expected = scale * scale;
-                assert!((polygon.area() / expected - 1.0).abs() < 1e-4, "{scale} {offset}");
+                assert!(
+                    (polygon.area() / expected - 1.0).abs() < 1e-4,
+                    "{scale} {offset}"
+                );
             }
         }
     }
@@ -499,7 +505,11 @@ mod tests {
             Vec3::new(0.3, 0.9, 0.0),
         ])
         .unwrap();
-        for at in [Vec2::new(0.1, 0.9), Vec2::new(0.5, 0.5), Vec2::new(1.0, 0.0)] {
+        for at in [
+            Vec2::new(0.1, 0.9),
+            Vec2::new(0.5, 0.5),
+            Vec2::new(1.0, 0.0),
+        ] {
             let back = quad.parameters(quad.point(at));
             assert!((back - at).length() < 1e-5, "{at} {back}");
         }

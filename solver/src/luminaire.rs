@@ -56,7 +56,7 @@ struct Receiver {
 impl Receiver {
     fn irradiance(&self, source: &Source, far: f32, visibility: &impl Visibility) -> f32 {
         match *source {
-            Source::Point { position } => self.from_point(position, visibility),
+            Source::Point { position } => self.point_light(position, visibility),
             Source::Spot {
                 position,
                 direction,
@@ -72,15 +72,15 @@ impl Receiver {
                 if intensity <= 0.0 {
                     return 0.0;
                 }
-                intensity * self.from_point(position, visibility)
+                intensity * self.point_light(position, visibility)
             }
-            Source::Sun { direction, angle } => self.from_sun(direction, angle, far, visibility),
-            Source::Sky => self.from_sky(far, visibility),
+            Source::Sun { direction, angle } => self.sunlight(direction, angle, far, visibility),
+            Source::Sky => self.skylight(far, visibility),
         }
     }
 
     /// `cos b / r^2`; 0 at the light's own place, where it has no meaning.
-    fn from_point(&self, position: Vec3, visibility: &impl Visibility) -> f32 {
+    fn point_light(&self, position: Vec3, visibility: &impl Visibility) -> f32 {
         let ray = position - self.position;
         let square = ray.length_squared();
         let cosine = ray.dot(self.normal) / math::safe_sqrt(square);
@@ -92,13 +92,7 @@ impl Receiver {
         }
     }
 
-    fn from_sun(
-        &self,
-        direction: Vec3,
-        angle: f32,
-        far: f32,
-        visibility: &impl Visibility,
-    ) -> f32 {
+    fn sunlight(&self, direction: Vec3, angle: f32, far: f32, visibility: &impl Visibility) -> f32 {
         let towards = -direction;
         if angle <= 0.0 {
             return self.escaping(towards, far, visibility) * towards.dot(self.normal).max(0.0);
@@ -114,7 +108,7 @@ impl Receiver {
             .sum()
     }
 
-    fn from_sky(&self, far: f32, visibility: &impl Visibility) -> f32 {
+    fn skylight(&self, far: f32, visibility: &impl Visibility) -> f32 {
         let (u, v) = self.normal.any_orthonormal_pair();
         let count = (SKY_STRATA * SKY_STRATA) as f32;
         strata(SKY_STRATA, self.rotation)
@@ -221,7 +215,10 @@ mod tests {
                 position: Vec3::Z * height,
             };
             let found = at_origin(&source, &[]);
-            assert!((found * height * height - 1.0).abs() < 1e-3, "{height} {found}");
+            assert!(
+                (found * height * height - 1.0).abs() < 1e-3,
+                "{height} {found}"
+            );
         }
         let behind = Source::Point { position: -Vec3::Z };
         assert_eq!(at_origin(&behind, &[]), 0.0);

@@ -184,7 +184,9 @@ impl fmt::Display for MeshError {
                 f,
                 "surface {surface}: an edge needs more than 65535 elements; ask for longer ones"
             ),
-            Self::TooManyFaces { limit } => write!(f, "more faces than the storage holds ({limit})"),
+            Self::TooManyFaces { limit } => {
+                write!(f, "more faces than the storage holds ({limit})")
+            }
             Self::TooManyPatches { limit } => {
                 write!(f, "more patches than the storage holds ({limit})")
             }
@@ -435,7 +437,8 @@ fn parts(edge: f32, length: f32) -> Option<u32> {
 
 /// The parameter corners of all cells of a grid, in the order in which they are numbered.
 fn cells(grid: Grid, is_triangle: bool) -> impl Iterator<Item = (Vec2, Vec2)> {
-    let corner = move |s: u32, t: u32| Vec2::new(s as f32 / grid.s as f32, t as f32 / grid.t as f32);
+    let corner =
+        move |s: u32, t: u32| Vec2::new(s as f32 / grid.s as f32, t as f32 / grid.t as f32);
     (0..grid.t).flat_map(move |t| {
         let columns = if is_triangle {
             2 * (grid.s - t) - 1
@@ -506,12 +509,19 @@ mod tests {
         for (patch, id) in mesh.patches.iter().zip(0..) {
             let own = mesh.elements.iter().filter(|e| e.patch == id);
             let sum: f32 = own.clone().map(|e| e.area).sum();
-            assert!((sum - patch.area).abs() < 1e-5, "patch {id}: {sum} {}", patch.area);
+            assert!(
+                (sum - patch.area).abs() < 1e-5,
+                "patch {id}: {sum} {}",
+                patch.area
+            );
             let outline = mesh.patch_polygon(id).unwrap();
             for element in own {
                 let centre = mesh.element_polygon(element).unwrap().center();
                 let ends = [centre + Vec3::Z, centre - Vec3::Z];
-                assert!(outline.crossing(ends[0], ends[1]).is_some(), "patch {id} {element:?}");
+                assert!(
+                    outline.crossing(ends[0], ends[1]).is_some(),
+                    "patch {id} {element:?}"
+                );
             }
         }
     }
@@ -542,7 +552,10 @@ mod tests {
             Err(MeshError::TooFine { surface: 0 })
         );
         for patch in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-            let spacing = Spacing { patch, element: 1.0 };
+            let spacing = Spacing {
+                patch,
+                element: 1.0,
+            };
             assert_eq!(
                 subdivide(&scene, spacing, all, &mut MeshStorage::<1, 6, 24>::new()),
                 Err(MeshError::Spacing),

@@ -179,9 +179,8 @@ impl<'a> FixedMix<'a> {
         let scale = atlas.lights().nth(light as usize).map(|l| l.scale.value());
         let expected = atlas.light_count();
         let scale = scale.ok_or(RelightError::Lights { expected })?;
-        let weight = (mix * scale).map(|w| {
-            math::round(math::scale_by_power_of_two(w, -self.exponent))
-        });
+        let weight =
+            (mix * scale).map(|w| math::round(math::scale_by_power_of_two(w, -self.exponent)));
         if weight.max_channel() > Self::LARGEST_SUM as f32 {
             return Err(RelightError::Range);
         }
@@ -410,7 +409,10 @@ mod tests {
         assert_eq!(float_weights(&atlas, &bad, &mut weights), refused);
         let elements = Err(RelightError::Elements { expected: 40 });
         let mut few = [Rgb::BLACK; 3];
-        assert_eq!(relight(&atlas, &DecodeTable::new(), &weights, &mut few), elements);
+        assert_eq!(
+            relight(&atlas, &DecodeTable::new(), &weights, &mut few),
+            elements
+        );
 
         let mut room = [[0; 3]; 2];
         let mut fixed = FixedMix::new(&atlas, &mix, &mix, &mut room).unwrap();

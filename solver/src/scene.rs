@@ -401,7 +401,8 @@ impl<'a> Scene<'a> {
         let vertices = || self.surfaces.iter().flat_map(|s| s.polygon.vertices());
         let low = vertices().copied().reduce(Vec3::min);
         let high = vertices().copied().reduce(Vec3::max);
-        low.zip(high).map_or(0.0, |(low, high)| (high - low).length())
+        low.zip(high)
+            .map_or(0.0, |(low, high)| (high - low).length())
     }
 }
 

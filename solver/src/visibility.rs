@@ -47,7 +47,10 @@ mod tests {
         let (above, below) = (Vec3::Z, -Vec3::Z);
         assert!(!occluders.sees(above, below));
         assert!(!occluders.sees(below, above));
-        assert!(occluders.sees(above, Vec3::ZERO), "a surface hides its own points");
+        assert!(
+            occluders.sees(above, Vec3::ZERO),
+            "a surface hides its own points"
+        );
         assert!(occluders.sees(above + Vec3::X * 3.0, below + Vec3::X * 3.0));
     }
 }

@@ -45,7 +45,8 @@ use crate::geometry::Polygon;
 use crate::mesh::Side;
 use crate::scene::Emission;
 
-const MAGIC: [u8; 8] = *b"RELUMEAT";
+/// How an atlas starts.
+pub const MAGIC: [u8; 8] = *b"RELUMEAT";
 const VERSION: u16 = 1;
 const HEADER_BYTES: usize = 48;
 const CHECKSUM_AT: usize = 20;

@@ -4,8 +4,8 @@ use glam::{Vec2, Vec3};
 
 use super::{
     AtlasElement, AtlasError, AtlasFace, AtlasLight, CHECKSUM_AT, Channels, CountsOf,
-    ELEMENT_BYTES, FACE_BYTES, HEADER_BYTES, LIGHT_BYTES, MAGIC, NO_LIGHT, Quantity,
-    SURFACE_BYTES, VERSION, checksum,
+    ELEMENT_BYTES, FACE_BYTES, HEADER_BYTES, LIGHT_BYTES, MAGIC, NO_LIGHT, Quantity, SURFACE_BYTES,
+    VERSION, checksum,
 };
 use crate::code::{Code, Scale};
 use crate::color::{Reflectance, Rgb};
@@ -167,7 +167,10 @@ impl AtlasMesh<'_> {
         }
         for index in 0..self.face_count() {
             let face = self.face(index).ok_or(AtlasError::Illegal("face"))?;
-            if face.emission.is_some_and(|emission| emission.light >= lights) {
+            if face
+                .emission
+                .is_some_and(|emission| emission.light >= lights)
+            {
                 return Err(AtlasError::Illegal("light of a face"));
             }
         }

@@ -82,7 +82,10 @@ fn what_was_written_is_read() {
             for (code, exact) in codes.iter().zip(value(element, tag).to_array()) {
                 let found = decode(*code) * scale;
                 let bound = error_bound(*code) * scale * 1.0001;
-                assert!((found - exact).abs() <= bound, "{element} {tag}: {found} {exact}");
+                assert!(
+                    (found - exact).abs() <= bound,
+                    "{element} {tag}: {found} {exact}"
+                );
             }
         }
     }

@@ -183,7 +183,11 @@ fn mesh_parts(surfaces: &[Surface], mesh: Mesh, output: &mut Output) -> Result<(
     }
     for element in mesh.elements {
         let patch = mesh.patches.get(element.patch as usize);
-        output.u32(patch.ok_or(AtlasError::Illegal("patch of an element"))?.face)?;
+        output.u32(
+            patch
+                .ok_or(AtlasError::Illegal("patch of an element"))?
+                .face,
+        )?;
         output.f32s(&element.from.to_array())?;
         output.f32s(&element.to.to_array())?;
         output.rgb(element.reflectance)?;

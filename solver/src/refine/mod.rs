@@ -16,190 +16,18 @@
 //! Lights come in blocks of `K` lanes; all blocks share one row. Rows that the caller hands in are
 //! kept as long as the row storage has room and are shot again without being evaluated again.
 
-use core::fmt;
+mod error;
+mod lanes;
+mod storage;
 
 use crate::color::Rgb;
 use crate::mesh::Mesh;
 
-/// One value per channel and lane of a block of `K` lights.
-pub type Lanes<const K: usize> = [[f32; K]; 3];
+pub use error::RefineError;
+pub use lanes::Lanes;
+pub use storage::{Block, FixedStorage, PatchState, Storage};
 
-/// What refinement knows of a patch, besides its unshot radiosity.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct PatchState {
-    /// Number of its row in the storage, plus one; 0 when the row is not known.
-    row: u32,
-    /// True once its own emission has been shot.
-    has_emitted: bool,
-    /// Reflected share of the row at hand: `sum_j A_j rho_j F_ji / A_p`.
-    gathered: Rgb,
-}
-
-impl PatchState {
-    /// Nothing known, nothing shot.
-    pub const EMPTY: Self = Self {
-        row: 0,
-        has_emitted: false,
-        gathered: Rgb::BLACK,
-    };
-}
-
-/// What refinement knows of a block of lights.
-#[derive(Clone, Copy, Debug)]
-pub struct Block<const K: usize> {
-    /// Power sent into the scene, summed over the channels, W.
-    emitted: [f32; K],
-    /// Weight in the choice of the next shooter.
-    importance: [f32; K],
-}
-
-impl<const K: usize> Block<K> {
-    /// Dark lights of importance one.
-    pub const EMPTY: Self = Self {
-        emitted: [0.0; K],
-        importance: [1.0; K],
-    };
-}
-
-/// Memory for one refinement, lent by the caller; contents are overwritten.
-///
-/// With `n` elements, `p` patches and `b` blocks: lanes are block-major, element or patch inside.
-#[derive(Debug)]
-pub struct Storage<'a, const K: usize> {
-    /// Irradiance, at least `n * b`.
-    pub irradiance: &'a mut [Lanes<K>],
-    /// The direct part of it, at least `n * b`; empty to not keep it apart.
-    pub direct: &'a mut [Lanes<K>],
-    /// Unshot radiosity, at least `p * b`.
-    pub unshot: &'a mut [Lanes<K>],
-    /// At least `p`.
-    pub patches: &'a mut [PatchState],
-    /// `b`: lights divided by `K`, rounded up.
-    pub blocks: &'a mut [Block<K>],
-    /// Kept rows, `n` floats each; as many as fit, possibly none.
-    pub rows: &'a mut [f32],
-}
-
-/// Storage of fixed capacity for one block of lights, fit for a `static`.
-///
-/// `ROWS` rows are kept; a row is as long as `ELEMENTS`.
-#[derive(Debug)]
-pub struct FixedStorage<
-    const K: usize,
-    const PATCHES: usize,
-    const ELEMENTS: usize,
-    const ROWS: usize,
-> {
-    irradiance: [Lanes<K>; ELEMENTS],
-    unshot: [Lanes<K>; PATCHES],
-    patches: [PatchState; PATCHES],
-    block: [Block<K>; 1],
-    rows: [[f32; ELEMENTS]; ROWS],
-}
-
-impl<const K: usize, const PATCHES: usize, const ELEMENTS: usize, const ROWS: usize>
-    FixedStorage<K, PATCHES, ELEMENTS, ROWS>
-{
-    /// Empty storage. No lights, no elements, or more patches than 16 bits name do not compile.
-    #[must_use]
-    pub const fn new() -> Self {
-        const {
-            assert!(K > 0, "a block holds at least one light");
-            assert!(ELEMENTS > 0, "there is at least one element");
-            assert!(PATCHES <= 65_536, "patch ids of a device are 16 bits wide");
-            assert!(ROWS <= PATCHES, "a patch has one row");
-        }
-        Self {
-            irradiance: [[[0.0; K]; 3]; ELEMENTS],
-            unshot: [[[0.0; K]; 3]; PATCHES],
-            patches: [PatchState::EMPTY; PATCHES],
-            block: [Block::EMPTY],
-            rows: [[0.0; ELEMENTS]; ROWS],
-        }
-    }
-
-    /// The storage as slices; direct light is not kept apart.
-    #[must_use]
-    pub const fn storage(&mut self) -> Storage<'_, K> {
-        Storage {
-            irradiance: &mut self.irradiance,
-            direct: &mut [],
-            unshot: &mut self.unshot,
-            patches: &mut self.patches,
-            blocks: &mut self.block,
-            rows: self.rows.as_flattened_mut(),
-        }
-    }
-}
-
-impl<const K: usize, const PATCHES: usize, const ELEMENTS: usize, const ROWS: usize> Default
-    for FixedStorage<K, PATCHES, ELEMENTS, ROWS>
-{
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-/// Why a refinement cannot start or go on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum RefineError {
-    /// More lights than the blocks hold.
-    TooManyLights {
-        /// Capacity of the storage.
-        limit: usize,
-    },
-    /// More elements than the storage holds.
-    TooManyElements {
-        /// Capacity of the storage.
-        limit: usize,
-    },
-    /// More patches than the storage holds.
-    TooManyPatches {
-        /// Capacity of the storage.
-        limit: usize,
-    },
-    /// The wanted residual is not a positive number.
-    Residual,
-    /// The importance of this light is not a positive finite number.
-    Importance {
-        /// Its tag.
-        light: u32,
-    },
-    /// There is no such patch or light.
-    Unknown,
-    /// A row does not have one factor in [0, 1] per element.
-    Row {
-        /// The first element whose factor is missing or illegal.
-        element: usize,
-    },
-}
-
-impl fmt::Display for RefineError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::TooManyLights { limit } => {
-                write!(f, "more lights than the storage holds ({limit})")
-            }
-            Self::TooManyElements { limit } => {
-                write!(f, "more elements than the storage holds ({limit})")
-            }
-            Self::TooManyPatches { limit } => {
-                write!(f, "more patches than the storage holds ({limit})")
-            }
-            Self::Residual => f.write_str("the residual to reach must be a positive number"),
-            Self::Importance { light } => {
-                write!(f, "light {light}: the importance must be a positive number")
-            }
-            Self::Unknown => f.write_str("there is no such patch or light"),
-            Self::Row { element } => {
-                write!(f, "element {element}: no legal factor in this row")
-            }
-        }
-    }
-}
-
-impl core::error::Error for RefineError {}
+use lanes::{add_to_lane, address, distribute, lane_of, part, sum, weighted};
 
 /// A refinement under way. Its state is usable after every shot.
 #[derive(Debug)]
@@ -234,7 +62,7 @@ impl<'a, const K: usize> Refinement<'a, K> {
         if residual.is_nan() || residual <= 0.0 {
             return Err(RefineError::Residual);
         }
-        fit(&mesh, lights, &mut storage)?;
+        storage.fit(&mesh, lights)?;
         storage.irradiance.fill([[0.0; K]; 3]);
         storage.direct.fill([[0.0; K]; 3]);
         storage.unshot.fill([[0.0; K]; 3]);
@@ -621,90 +449,5 @@ impl<'a, const K: usize> Refinement<'a, K> {
     }
 }
 
-/// Checks that every slice is long enough and cuts it to length.
-fn fit<const K: usize>(
-    mesh: &Mesh,
-    lights: u32,
-    storage: &mut Storage<'_, K>,
-) -> Result<(), RefineError> {
-    let blocks = (lights as usize).div_ceil(K.max(1));
-    if storage.blocks.len() < blocks {
-        return Err(RefineError::TooManyLights {
-            limit: storage.blocks.len() * K,
-        });
-    }
-    let (n, p) = (mesh.elements.len(), mesh.patches.len());
-    let (irradiance, direct) = (storage.irradiance.len(), storage.direct.len());
-    let elements = if direct == 0 {
-        irradiance
-    } else {
-        irradiance.min(direct)
-    };
-    let per_block = |length: usize| length.checked_div(blocks).unwrap_or(usize::MAX);
-    if per_block(elements) < n {
-        return Err(RefineError::TooManyElements {
-            limit: per_block(elements),
-        });
-    }
-    let patches = per_block(storage.unshot.len()).min(storage.patches.len());
-    if patches < p {
-        return Err(RefineError::TooManyPatches { limit: patches });
-    }
-    cut(&mut storage.blocks, blocks);
-    cut(&mut storage.patches, p);
-    Ok(())
-}
-
-fn cut<T>(slice: &mut &mut [T], length: usize) {
-    let whole = core::mem::take(slice);
-    *slice = whole.get_mut(..length).unwrap_or_default();
-}
-
-/// Block and lane of a light.
-const fn address<const K: usize>(light: u32) -> (usize, usize) {
-    const { assert!(K > 0, "a block holds at least one light") }
-    (light as usize / K, light as usize % K)
-}
-
-/// The lanes of one block.
-fn part<const K: usize>(lanes: &mut [Lanes<K>], block: usize, length: usize) -> &mut [Lanes<K>] {
-    let tail = lanes.get_mut(block * length..).unwrap_or_default();
-    let length = length.min(tail.len());
-    tail.get_mut(..length).unwrap_or_default()
-}
-
-/// `E_j += F_j delta` for every element of a block.
-fn distribute<const K: usize>(irradiance: &mut [Lanes<K>], row: &[f32], delta: &Lanes<K>) {
-    for (lanes, factor) in irradiance.iter_mut().zip(row) {
-        for (channel, shot) in lanes.iter_mut().zip(delta) {
-            for (value, shot) in channel.iter_mut().zip(shot) {
-                *value += factor * shot;
-            }
-        }
-    }
-}
-
-fn lane_of<const K: usize>([r, g, b]: &Lanes<K>, lane: usize) -> Rgb {
-    let value = |channel: &[f32; K]| channel.get(lane).copied().unwrap_or(0.0);
-    Rgb::new(value(r), value(g), value(b))
-}
-
-fn add_to_lane<const K: usize>(lanes: &mut Lanes<K>, lane: usize, value: Rgb) {
-    for (channel, value) in lanes.iter_mut().zip(value.to_array()) {
-        if let Some(slot) = channel.get_mut(lane) {
-            *slot += value;
-        }
-    }
-}
-
-fn weighted<const K: usize>([r, g, b]: &Lanes<K>, weights: &[f32; K]) -> f32 {
-    let channels = r.iter().zip(g).zip(b);
-    channels
-        .zip(weights)
-        .map(|(((r, g), b), weight)| (r + g + b) * weight)
-        .sum()
-}
-
-fn sum(value: Rgb) -> f32 {
-    value.r + value.g + value.b
-}
+#[cfg(test)]
+mod tests;

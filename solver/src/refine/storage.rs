@@ -1,0 +1,158 @@
+//! The memory of a refinement: lent by the caller, or owned at fixed capacity.
+
+use super::{Lanes, RefineError};
+use crate::color::Rgb;
+use crate::mesh::Mesh;
+
+/// What refinement knows of a patch, besides its unshot radiosity.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PatchState {
+    /// Number of its row in the storage, plus one; 0 when the row is not known.
+    pub(super) row: u32,
+    /// True once its own emission has been shot.
+    pub(super) has_emitted: bool,
+    /// Reflected share of the row at hand: `sum_j A_j rho_j F_ji / A_p`.
+    pub(super) gathered: Rgb,
+}
+
+impl PatchState {
+    /// Nothing known, nothing shot.
+    pub const EMPTY: Self = Self {
+        row: 0,
+        has_emitted: false,
+        gathered: Rgb::BLACK,
+    };
+}
+
+/// What refinement knows of a block of lights.
+#[derive(Clone, Copy, Debug)]
+pub struct Block<const K: usize> {
+    /// Power sent into the scene, summed over the channels, W.
+    pub(super) emitted: [f32; K],
+    /// Weight in the choice of the next shooter.
+    pub(super) importance: [f32; K],
+}
+
+impl<const K: usize> Block<K> {
+    /// Dark lights of importance one.
+    pub const EMPTY: Self = Self {
+        emitted: [0.0; K],
+        importance: [1.0; K],
+    };
+}
+
+/// Memory for one refinement, lent by the caller; contents are overwritten.
+///
+/// With `n` elements, `p` patches and `b` blocks: lanes are block-major, element or patch inside.
+#[derive(Debug)]
+pub struct Storage<'a, const K: usize> {
+    /// Irradiance, at least `n * b`.
+    pub irradiance: &'a mut [Lanes<K>],
+    /// The direct part of it, at least `n * b`; empty to not keep it apart.
+    pub direct: &'a mut [Lanes<K>],
+    /// Unshot radiosity, at least `p * b`.
+    pub unshot: &'a mut [Lanes<K>],
+    /// At least `p`.
+    pub patches: &'a mut [PatchState],
+    /// `b`: lights divided by `K`, rounded up.
+    pub blocks: &'a mut [Block<K>],
+    /// Kept rows, `n` floats each; as many as fit, possibly none.
+    pub rows: &'a mut [f32],
+}
+
+/// Storage of fixed capacity for one block of lights, fit for a `static`.
+///
+/// `ROWS` rows are kept; a row is as long as `ELEMENTS`.
+#[derive(Debug)]
+pub struct FixedStorage<
+    const K: usize,
+    const PATCHES: usize,
+    const ELEMENTS: usize,
+    const ROWS: usize,
+> {
+    irradiance: [Lanes<K>; ELEMENTS],
+    unshot: [Lanes<K>; PATCHES],
+    patches: [PatchState; PATCHES],
+    block: [Block<K>; 1],
+    rows: [[f32; ELEMENTS]; ROWS],
+}
+
+impl<const K: usize, const PATCHES: usize, const ELEMENTS: usize, const ROWS: usize>
+    FixedStorage<K, PATCHES, ELEMENTS, ROWS>
+{
+    /// Empty storage. No lights, no elements, or more patches than 16 bits name do not compile.
+    #[must_use]
+    pub const fn new() -> Self {
+        const {
+            assert!(K > 0, "a block holds at least one light");
+            assert!(ELEMENTS > 0, "there is at least one element");
+            assert!(PATCHES <= 65_536, "patch ids of a device are 16 bits wide");
+            assert!(ROWS <= PATCHES, "a patch has one row");
+        }
+        Self {
+            irradiance: [[[0.0; K]; 3]; ELEMENTS],
+            unshot: [[[0.0; K]; 3]; PATCHES],
+            patches: [PatchState::EMPTY; PATCHES],
+            block: [Block::EMPTY],
+            rows: [[0.0; ELEMENTS]; ROWS],
+        }
+    }
+
+    /// The storage as slices; direct light is not kept apart.
+    #[must_use]
+    pub const fn storage(&mut self) -> Storage<'_, K> {
+        Storage {
+            irradiance: &mut self.irradiance,
+            direct: &mut [],
+            unshot: &mut self.unshot,
+            patches: &mut self.patches,
+            blocks: &mut self.block,
+            rows: self.rows.as_flattened_mut(),
+        }
+    }
+}
+
+impl<const K: usize, const PATCHES: usize, const ELEMENTS: usize, const ROWS: usize> Default
+    for FixedStorage<K, PATCHES, ELEMENTS, ROWS>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const K: usize> Storage<'_, K> {
+    /// Checks that every slice is long enough and cuts those to length that are walked whole.
+    pub(super) fn fit(&mut self, mesh: &Mesh, lights: u32) -> Result<(), RefineError> {
+        let blocks = (lights as usize).div_ceil(K.max(1));
+        if self.blocks.len() < blocks {
+            return Err(RefineError::TooManyLights {
+                limit: self.blocks.len() * K,
+            });
+        }
+        let (n, p) = (mesh.elements.len(), mesh.patches.len());
+        let (irradiance, direct) = (self.irradiance.len(), self.direct.len());
+        let elements = if direct == 0 {
+            irradiance
+        } else {
+            irradiance.min(direct)
+        };
+        let per_block = |length: usize| length.checked_div(blocks).unwrap_or(usize::MAX);
+        if per_block(elements) < n {
+            return Err(RefineError::TooManyElements {
+                limit: per_block(elements),
+            });
+        }
+        let patches = per_block(self.unshot.len()).min(self.patches.len());
+        if patches < p {
+            return Err(RefineError::TooManyPatches { limit: patches });
+        }
+        cut(&mut self.blocks, blocks);
+        cut(&mut self.patches, p);
+        Ok(())
+    }
+}
+
+fn cut<T>(slice: &mut &mut [T], length: usize) {
+    let whole = core::mem::take(slice);
+    *slice = whole.get_mut(..length).unwrap_or_default();
+}
