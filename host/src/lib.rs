@@ -1,6 +1,8 @@
 //! Import, baking, references, pictures and the command line of Relume.
 //!
-//! Modules in the order in which data flows through them.
+//! Modules in the order in which data flows through them; each names only those above it.
+
+pub mod file;
 
 pub mod texture;
 
@@ -10,9 +12,25 @@ pub mod builtin;
 
 pub mod import;
 
-pub mod export;
+pub mod bvh;
+
+pub mod mesh;
+
+pub mod solution;
+
+pub mod bake;
 
 pub mod picture;
+
+pub mod display_error;
+
+pub mod pack;
+
+pub mod mix;
+
+pub mod probe;
+
+pub mod export;
 
 pub mod preview;
 

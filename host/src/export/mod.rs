@@ -1,1 +1,3 @@
-//! Stub: being written.
+//! Files for other programs.
+
+pub mod exr;

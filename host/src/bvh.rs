@@ -1,0 +1,189 @@
+//! Visibility through a bounding volume hierarchy: the same answer as
+//! [`relume::visibility::Occluders`], faster where there are many surfaces.
+//!
+//! The tree comes from `obvhs` and is built on one thread, so it is the same every time; leaves ask
+//! [`Polygon::crossing`], so a segment is blocked here exactly when it is blocked on a device.
+
+use std::time::Duration;
+
+use glam::{Vec3, Vec3A};
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::builder::build_bvh2;
+use obvhs::ray::{Ray, RayHit};
+use obvhs::{BvhBuildParams, Boundable};
+
+use relume::geometry::Polygon;
+use relume::scene::Surface;
+use relume::visibility::Visibility;
+
+/// Surfaces in a tree of boxes.
+pub struct Bvh {
+    tree: Bvh2,
+    /// Outlines in the order of the tree's leaves.
+    polygons: Vec<Polygon>,
+    /// Number of the surface of each outline.
+    surfaces: Vec<u32>,
+}
+
+impl std::fmt::Debug for Bvh {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Bvh")
+            .field("surfaces", &self.surfaces.len())
+            .finish_non_exhaustive()
+    }
+}
+
+/// The nearest surface along a segment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Number of the surface.
+    pub surface: u32,
+    /// Where, as a fraction of the segment.
+    pub fraction: f32,
+    /// True when the front of the surface was met.
+    pub front: bool,
+}
+
+/// A polygon's box, widened by the rounding that [`Polygon::crossing`] allows.
+struct Bounded(Aabb);
+
+impl Boundable for Bounded {
+    fn aabb(&self) -> Aabb {
+        self.0
+    }
+}
+
+impl Bounded {
+    fn new(polygon: &Polygon) -> Self {
+        let mut bounds = Aabb::empty();
+        for vertex in polygon.vertices() {
+            bounds.extend(Vec3A::from(*vertex));
+        }
+        let magnitude = bounds.min.abs().max(bounds.max.abs()).max_element();
+        let (_, tolerance) = polygon.height(polygon.center());
+        let margin = Vec3A::splat(2.0 * tolerance + 64.0 * f32::EPSILON * magnitude);
+        Self(Aabb::new(bounds.min - margin, bounds.max + margin))
+    }
+}
+
+impl Bvh {
+    /// Builds the tree.
+    #[must_use]
+    pub fn new(surfaces: &[Surface]) -> Self {
+        let boxes: Vec<Bounded> = surfaces
+            .iter()
+            .map(|surface| Bounded::new(surface.polygon()))
+            .collect();
+        let mut build_time = Duration::ZERO;
+        let tree = build_bvh2(&boxes, BvhBuildParams::very_slow_build(), &mut build_time);
+        let order = tree.primitive_indices.clone();
+        Self {
+            polygons: order
+                .iter()
+                .filter_map(|index| surfaces.get(*index as usize))
+                .map(|surface| *surface.polygon())
+                .collect(),
+            surfaces: order,
+            tree,
+        }
+    }
+
+    /// The nearest surface that crosses the open segment.
+    #[must_use]
+    pub fn nearest(&self, from: Vec3, to: Vec3) -> Option<Hit> {
+        let mut hit = RayHit::none();
+        self.tree
+            .ray_traverse(segment(from, to), &mut hit, |_, index| {
+                self.crossing(index, from, to).unwrap_or(f32::INFINITY)
+            });
+        let index = hit.primitive_id as usize;
+        let polygon = self.polygons.get(index)?;
+        Some(Hit {
+            surface: *self.surfaces.get(index)?,
+            fraction: hit.t,
+            front: (to - from).dot(polygon.normal()) < 0.0,
+        })
+    }
+
+    fn crossing(&self, index: usize, from: Vec3, to: Vec3) -> Option<f32> {
+        self.polygons.get(index)?.crossing(from, to)
+    }
+}
+
+impl Visibility for Bvh {
+    fn sees(&self, from: Vec3, to: Vec3) -> bool {
+        self.tree
+            .ray_traverse_miss(segment(from, to), |_, index| {
+                match self.crossing(index, from, to) {
+                    Some(_) => 0.0,
+                    None => f32::INFINITY,
+                }
+            })
+    }
+}
+
+/// The segment as a ray of parameter range [0, 1]; its end is left a little room for rounding.
+fn segment(from: Vec3, to: Vec3) -> Ray {
+    let direction = Vec3A::from(to - from);
+    Ray::new(Vec3A::from(from), direction, 0.0, 1.0 + 1e-4)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use relume::color::Rgb;
+    use relume::visibility::Occluders;
+
+    fn point() -> impl Strategy<Value = Vec3> {
+        [-1.0_f32..1.0, -1.0_f32..1.0, -1.0_f32..1.0].prop_map(Vec3::from_array)
+    }
+
+    fn surfaces(triangles: &[[Vec3; 3]]) -> Vec<Surface> {
+        triangles
+            .iter()
+            .filter_map(|vertices| Surface::new(0, vertices, Rgb::BLACK).ok())
+            .collect()
+    }
+
+    proptest! {
+        #[test]
+        fn the_tree_sees_what_brute_force_sees(
+            triangles in proptest::collection::vec([point(), point(), point()], 0..60),
+            ends in proptest::collection::vec((point(), point()), 50),
+        ) {
+            let surfaces = surfaces(&triangles);
+            let bvh = Bvh::new(&surfaces);
+            let brute = Occluders(&surfaces);
+            for (from, to) in ends {
+                prop_assert_eq!(bvh.sees(from, to), brute.sees(from, to), "{} {}", from, to);
+                let nearest = surfaces
+                    .iter()
+                    .filter_map(|s| s.polygon().crossing(from, to))
+                    .reduce(f32::min);
+                prop_assert_eq!(bvh.nearest(from, to).map(|hit| hit.fraction), nearest);
+            }
+        }
+
+        #[test]
+        fn axis_parallel_segments_and_walls_agree_as_well(
+            steps in proptest::collection::vec((0_u8..4, 0_u8..4, 0_u8..4, 0_u8..4, 0_u8..3), 30),
+        ) {
+            let at = |i: u8| f32::from(i) - 1.5;
+            let surfaces: Vec<Surface> = steps.iter().map(|&(x, y, z, _, axis)| {
+                let (u, v) = [(Vec3::X, Vec3::Y), (Vec3::Y, Vec3::Z), (Vec3::Z, Vec3::X)][axis as usize];
+                let o = Vec3::new(at(x), at(y), at(z));
+                Surface::new(0, &[o, o + u, o + u + v, o + v], Rgb::BLACK).unwrap()
+            }).collect();
+            let bvh = Bvh::new(&surfaces);
+            let brute = Occluders(&surfaces);
+            for &(x, y, z, w, axis) in &steps {
+                let from = Vec3::new(at(x), at(y), at(z)) * 0.75;
+                let mut to = from;
+                to[axis as usize] += f32::from(w) - 1.7;
+                prop_assert_eq!(bvh.sees(from, to), brute.sees(from, to), "{} {}", from, to);
+            }
+        }
+    }
+}

@@ -1,0 +1,198 @@
+//! `relume bake`.
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::json;
+
+use super::{Outcome, human_bytes, output_path, write_file};
+use crate::bake::{Method, Progress, Settings, bake};
+use crate::import;
+use crate::scene::OwnedScene;
+use crate::solution::{self, Solution};
+
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// The scene: .obj, .gltf or .glb
+    scene: PathBuf,
+    /// Lights to add or to change (TOML)
+    #[arg(long, value_name = "FILE.toml")]
+    lights: Option<PathBuf>,
+    /// Where the solution goes; `-` is stdout [default: the scene's name .solution, here]
+    #[arg(short, long, value_name = "FILE.solution")]
+    output: Option<PathBuf>,
+    /// Longest edge of a patch, in the file's units [default: four elements]
+    #[arg(long, value_name = "LENGTH", value_parser = positive)]
+    patch: Option<f32>,
+    /// Longest edge of an element [default: sqrt(reflecting area / 8000)]
+    #[arg(long, value_name = "LENGTH", value_parser = positive)]
+    element: Option<f32>,
+    /// Stop when every light has at most this share of its power left to distribute
+    #[arg(long, value_name = "R", default_value_t = Settings::default().residual, value_parser = positive)]
+    residual: f32,
+    /// Stop after so many distinct rows (plain shots with --plain)
+    #[arg(long, value_name = "N")]
+    shots: Option<u32>,
+    /// As published: rows are not kept, and no ambient term stands for what is left
+    #[arg(long)]
+    plain: bool,
+    /// Keep direct and indirect light apart
+    #[arg(long)]
+    split_direct: bool,
+    /// Who evaluates form factors: all cores, or the solver alone as on a device
+    #[arg(long, value_enum, default_value_t = MethodName::Host)]
+    method: MethodName,
+    /// Threads [default: one per core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum MethodName {
+    Host,
+    Device,
+}
+
+fn positive(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("it must be a positive number".to_owned()),
+    }
+}
+
+impl Arguments {
+    fn settings(&self) -> Settings {
+        Settings {
+            patch: self.patch,
+            element: self.element,
+            residual: self.residual,
+            shots: self.shots,
+            plain: self.plain,
+            split_direct: self.split_direct,
+            method: match self.method {
+                MethodName::Host => Method::Host,
+                MethodName::Device => Method::Device,
+            },
+        }
+    }
+}
+
+pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
+    let path = arguments.scene.display().to_string();
+    let output = output_path(arguments.output.as_deref(), &arguments.scene, "solution", json);
+    let imported = import::load(&arguments.scene, arguments.lights.as_deref())?;
+    for line in imported.repairs.lines() {
+        eprintln!("{path}: {line}");
+    }
+
+    let mut pool = rayon::ThreadPoolBuilder::new();
+    if let Some(threads) = arguments.threads {
+        pool = pool.num_threads(threads.into());
+    }
+    let pool = pool.build().context("starting threads")?;
+    let baked = pool
+        .install(|| watched(&imported.scene, &arguments.settings()))
+        .with_context(|| path.clone())?;
+    let bytes = solution::write(&baked.solution);
+    write_file(&output, &bytes)?;
+    report(&baked, &output.display().to_string(), bytes.len());
+
+    let solution = &baked.solution;
+    let lights = solution.lights.iter().map(|light| {
+        json!({"name": light.name, "emission": light.emission.to_array(), "residual": light.residual})
+    });
+    Ok(Outcome {
+        interrupted: baked.interrupted,
+        report: json!({
+            "file": output,
+            "bytes": bytes.len(),
+            "surfaces": solution.surfaces.len(),
+            "faces": solution.mesh.faces.len(),
+            "patches": solution.mesh.patches.len(),
+            "elements": solution.mesh.elements.len(),
+            "lights": lights.collect::<Vec<_>>(),
+            "patch": solution.spacing.patch,
+            "element": solution.spacing.element,
+            "shots": solution.rows,
+            "residual": baked.residual(),
+            "method": arguments.settings().method.name(),
+            "seconds": baked.time.as_secs_f64(),
+            "interrupted": baked.interrupted,
+            "repairs": imported.repairs.lines(),
+        }),
+    })
+}
+
+/// A solution, how long it took, and whether the user ended it.
+pub struct Baked {
+    pub solution: Solution,
+    pub time: Duration,
+    pub interrupted: bool,
+}
+
+impl Baked {
+    /// The largest residual of all lights.
+    pub fn residual(&self) -> f32 {
+        let residuals = self.solution.lights.iter().map(|light| light.residual);
+        residuals.fold(0.0, f32::max)
+    }
+}
+
+/// Set by the first Ctrl-C; the second one ends the program at once.
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// Bakes with a progress bar (on a terminal) and an ear for Ctrl-C.
+pub fn watched(scene: &OwnedScene, settings: &Settings) -> Result<Baked> {
+    // A handler that is already there does the same.
+    let _ = ctrlc::set_handler(|| {
+        if INTERRUPTED.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    });
+    let bar = ProgressBar::new(0).with_style(
+        ProgressStyle::with_template("{bar:30} {pos}/{len} rows  {msg}  {elapsed}")
+            .context("progress bar")?,
+    );
+    let start = Instant::now();
+    let mut interrupted = false;
+    let mut watch = |progress: Progress| {
+        bar.set_length(progress.patches as u64);
+        bar.set_position(progress.rows.into());
+        bar.set_message(format!("residual {:.5}", progress.residual));
+        interrupted = INTERRUPTED.load(Ordering::Relaxed);
+        if interrupted {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    };
+    let solution = bake(scene, settings, &mut watch);
+    bar.finish_and_clear();
+    Ok(Baked {
+        solution: solution?,
+        time: start.elapsed(),
+        interrupted,
+    })
+}
+
+fn report(baked: &Baked, file: &str, bytes: usize) {
+    let solution = &baked.solution;
+    if baked.interrupted {
+        eprintln!("interrupted: this is what --shots {} gives", solution.rows);
+    }
+    eprintln!(
+        "{file}: {} elements, {} patches, {} lights, {} rows, residual {:.2e}, {:.2} s, {}",
+        solution.mesh.elements.len(),
+        solution.mesh.patches.len(),
+        solution.lights.len(),
+        solution.rows,
+        baked.residual(),
+        baked.time.as_secs_f64(),
+        human_bytes(bytes),
+    );
+}

@@ -1,0 +1,79 @@
+//! Solutions and atlases from files, told apart by their first bytes.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result, anyhow, bail};
+use relume::atlas::{Atlas, Quantity};
+use relume::color::Rgb;
+
+use crate::pack::{relight_atlas, unpack};
+use crate::solution::{self, Solution};
+
+/// What a file holds.
+pub enum Loaded {
+    /// Contributions in `f32`.
+    Solution(Solution),
+    /// Packed contributions, decoded, and the bytes that they came from.
+    Atlas {
+        /// The bytes, known to be a valid atlas.
+        bytes: Vec<u8>,
+        /// Their contents.
+        solution: Solution,
+        /// What the contributions measure.
+        quantity: Quantity,
+    },
+}
+
+/// Reads a solution or an atlas.
+pub fn load(path: &Path) -> Result<Loaded> {
+    let bytes = read(path)?;
+    if bytes.starts_with(&solution::MAGIC) {
+        let solution = solution::read(&bytes).with_context(|| path.display().to_string())?;
+        return Ok(Loaded::Solution(solution));
+    }
+    if !bytes.starts_with(&relume::atlas::MAGIC) {
+        bail!(
+            "{}: neither a solution nor an atlas; make one with `relume bake` or `relume pack`",
+            path.display()
+        );
+    }
+    let atlas = Atlas::parse(&bytes).with_context(|| path.display().to_string())?;
+    Ok(Loaded::Atlas {
+        solution: unpack(&atlas),
+        quantity: atlas.quantity(),
+        bytes,
+    })
+}
+
+pub fn read(path: &Path) -> Result<Vec<u8>> {
+    fs::read(path).map_err(|error| anyhow!("{}: cannot be read: {error}", path.display()))
+}
+
+impl Loaded {
+    /// The contributions and the mesh.
+    pub const fn solution(&self) -> &Solution {
+        match self {
+            Self::Solution(solution) | Self::Atlas { solution, .. } => solution,
+        }
+    }
+
+    /// The quantity of every element under a mix, by the kernel that belongs to the file.
+    pub fn relight(&self, mix: &[Rgb]) -> Result<Vec<Rgb>> {
+        match self {
+            Self::Solution(solution) => Ok(solution.relight(mix)),
+            Self::Atlas { bytes, .. } => Ok(relight_atlas(&Atlas::parse(bytes)?, mix)?),
+        }
+    }
+
+    /// True when the reflectance is multiplied in already.
+    pub const fn is_radiosity(&self) -> bool {
+        matches!(
+            self,
+            Self::Atlas {
+                quantity: Quantity::Radiosity,
+                ..
+            }
+        )
+    }
+}

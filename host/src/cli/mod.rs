@@ -1,0 +1,130 @@
+//! The command line: grammar, dispatch, exit codes.
+//!
+//! Data go to stdout, people's text and progress to stderr. Exit 0 done, 1 the input is wrong or a
+//! limit is hit (one line), 2 wrong usage, 130 interrupted with a valid result.
+
+mod bake;
+mod info;
+mod job;
+mod load;
+mod pack;
+mod probe;
+mod relight;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, Result};
+use clap::{Parser, Subcommand};
+use serde_json::Value;
+
+use crate::file::write_whole;
+
+/// Radiosity relighting: bake a scene once with every light kept apart, then dim, switch and
+/// colour its lights with all their bounces.
+///
+/// Without a command: bakes, packs and relights the built-in Cornell box into `out/`.
+#[derive(Debug, Parser)]
+#[command(name = "relume", version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    /// Print one machine-readable object on stdout, and nothing else there
+    #[arg(long, global = true)]
+    json: bool,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Import a scene (OBJ, glTF), mesh it and solve its light
+    Bake(bake::Arguments),
+    /// Pack a solution into 8-bit codes
+    Pack(pack::Arguments),
+    /// Make the picture of one mix of the lights
+    Relight(relight::Arguments),
+    /// Irradiance at points or elements, for every light by itself
+    Probe(probe::Arguments),
+    /// What a solution or atlas holds, and what it costs on a device
+    Info(info::Arguments),
+}
+
+/// How a command ended, with what `--json` prints.
+struct Outcome {
+    report: Value,
+    interrupted: bool,
+}
+
+impl Outcome {
+    const fn done(report: Value) -> Self {
+        Self {
+            report,
+            interrupted: false,
+        }
+    }
+}
+
+/// Runs the program on its arguments.
+#[must_use]
+pub fn run() -> ExitCode {
+    let cli = Cli::parse();
+    let outcome = match cli.command {
+        None => job::run(),
+        Some(Command::Bake(arguments)) => bake::run(&arguments, cli.json),
+        Some(Command::Pack(arguments)) => pack::run(&arguments, cli.json),
+        Some(Command::Relight(arguments)) => relight::run(&arguments, cli.json),
+        Some(Command::Probe(arguments)) => probe::run(&arguments, cli.json),
+        Some(Command::Info(arguments)) => info::run(&arguments),
+    };
+    match outcome {
+        Ok(outcome) => {
+            if cli.json {
+                println!("{}", outcome.report);
+            }
+            ExitCode::from(if outcome.interrupted { 130 } else { 0 })
+        }
+        Err(error) => {
+            // One line, whatever the message came with.
+            let message = format!("{error:#}").replace('\n', " ");
+            eprintln!("relume: {message}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// The output path: as given, or the input's name with another extension, in this folder.
+///
+/// With `--json`, stdout is taken; a result that should go there as well is wrong usage.
+fn output_path(given: Option<&Path>, input: &Path, extension: &str, json: bool) -> PathBuf {
+    let path = given.map_or_else(
+        || {
+            let stem = input.file_stem().unwrap_or(input.as_os_str());
+            Path::new(stem).with_extension(extension)
+        },
+        Path::to_path_buf,
+    );
+    if json && path == Path::new("-") {
+        wrong_usage("with --json, stdout holds the report: give -o a file name");
+    }
+    path
+}
+
+fn wrong_usage(message: &str) -> ! {
+    clap::Error::raw(clap::error::ErrorKind::ArgumentConflict, format!("{message}\n")).exit()
+}
+
+fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_whole(path, bytes).with_context(|| format!("{}: cannot be written", path.display()))
+}
+
+/// A size for people.
+fn human_bytes(bytes: usize) -> String {
+    const KIB: f64 = 1024.0;
+    let bytes = bytes as f64;
+    if bytes < KIB {
+        format!("{bytes} B")
+    } else if bytes < KIB * KIB {
+        format!("{:.1} KiB", bytes / KIB)
+    } else {
+        format!("{:.1} MiB", bytes / KIB / KIB)
+    }
+}

@@ -1,0 +1,81 @@
+//! `relume probe`.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use clap::Args;
+use serde_json::json;
+
+use super::load::{Loaded, load, read};
+use super::{Outcome, output_path, write_file};
+use crate::probe::{Part, Probed, ProbeError, probe_elements, probe_points, read_points};
+
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// A solution or an atlas
+    input: PathBuf,
+    #[command(flatten)]
+    places: Places,
+    /// Direct light only
+    #[arg(long)]
+    direct: bool,
+    /// Where the CSV goes; `-` is stdout
+    #[arg(short, long, value_name = "OUT.csv", default_value = "-")]
+    output: PathBuf,
+}
+
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+struct Places {
+    /// Surface points: CSV with the header x,y,z,nx,ny,nz
+    #[arg(long, value_name = "POINTS.csv")]
+    points: Option<PathBuf>,
+    /// Every element
+    #[arg(long)]
+    elements: bool,
+}
+
+pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
+    let output = output_path(Some(&arguments.output), Path::new("-"), "csv", json);
+    let loaded = load(&arguments.input)?;
+    let solution = loaded.solution();
+    let part = if arguments.direct {
+        Part::Direct
+    } else {
+        Part::Total
+    };
+    let named = |error: ProbeError| named(error, &arguments.input, &loaded);
+    let probed = match &arguments.places.points {
+        None => Probed {
+            csv: probe_elements(solution, part).map_err(named)?,
+            missing: 0,
+        },
+        Some(file) => {
+            let points = read_points(&read(file)?).with_context(|| file.display().to_string())?;
+            probe_points(solution, &points, part).map_err(named)?
+        }
+    };
+    if probed.missing > 0 {
+        eprintln!(
+            "{} points lie on no surface that stores light; their rows are nan",
+            probed.missing
+        );
+    }
+    write_file(&output, &probed.csv)?;
+    Ok(Outcome::done(json!({
+        "file": output,
+        "lights": solution.lights.len(),
+        "missing": probed.missing,
+    })))
+}
+
+/// The file that an error is about, and why an atlas never has direct light.
+fn named(error: ProbeError, input: &Path, loaded: &Loaded) -> anyhow::Error {
+    let error = match (&error, loaded) {
+        (ProbeError::NoDirect, Loaded::Atlas { .. }) => anyhow::anyhow!(
+            "an atlas does not keep direct light apart; probe the solution that it was packed from"
+        ),
+        _ => error.into(),
+    };
+    error.context(input.display().to_string())
+}

@@ -1,0 +1,166 @@
+//! `relume relight`.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use glam::Vec3;
+use relume::color::Rgb;
+use serde_json::json;
+
+use super::load::{Loaded, load};
+use super::{Outcome, output_path, write_file};
+use crate::export::exr;
+use crate::mesh::OwnedMesh;
+use crate::mix::{Setting, mix};
+use crate::picture::{self, Exposure};
+use crate::preview::{Camera, Relit, Viewpoint, render, show};
+
+/// Behind everything.
+pub const BACKGROUND: [u8; 3] = [0, 0, 0];
+
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// A solution or an atlas
+    input: PathBuf,
+    /// Set a light: 0.5 (of nominal), #ffcc88, 2x#ffcc88, or r,g,b; unset ones stay nominal
+    #[arg(long, value_name = "LIGHT=VALUE")]
+    set: Vec<Setting>,
+    /// The same, but all other lights are off
+    #[arg(long, value_name = "LIGHT=VALUE")]
+    only: Vec<Setting>,
+    /// Where the picture goes: .png, or .exr (linear, unexposed); `-` is stdout, as PNG
+    /// [default: the input's name .png, here]
+    #[arg(short, long, value_name = "OUT.png|OUT.exr")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    camera: CameraArguments,
+    /// Width and height in pixels
+    #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = size)]
+    size: (u32, u32),
+    /// Factor on radiance, or `auto`: the 98th percentile of luminance becomes white
+    #[arg(long, default_value = "auto", value_name = "auto|VALUE")]
+    exposure: Exposure,
+}
+
+/// Where the picture is taken from; without any of it, the program chooses.
+#[derive(Debug, Args)]
+struct CameraArguments {
+    /// Camera file (TOML: eye, target, up, fov)
+    #[arg(long, value_name = "FILE.toml", conflicts_with_all = ["eye", "target", "up", "fov"])]
+    camera: Option<PathBuf>,
+    /// Where the camera stands
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
+    eye: Option<Vec3>,
+    /// What it looks at
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
+    target: Option<Vec3>,
+    /// What is up
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
+    up: Option<Vec3>,
+    /// Vertical field of view in radians
+    #[arg(long, value_name = "RADIANS")]
+    fov: Option<f32>,
+}
+
+fn vector(text: &str) -> Result<Vec3, String> {
+    let numbers: Result<Vec<f32>, _> = text.split(',').map(|n| n.trim().parse()).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, z]) => Ok(Vec3::new(x, y, z)),
+        _ => Err("three numbers, as 1,2.5,-3".to_owned()),
+    }
+}
+
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let sides = text.split_once('x');
+    let parsed = sides.and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    parsed.ok_or_else(|| "width and height, as 640x480".to_owned())
+}
+
+impl CameraArguments {
+    fn viewpoint(&self, loaded: &Loaded, aspect: f32) -> Result<Viewpoint> {
+        if let Some(file) = &self.camera {
+            return Ok(Viewpoint::from_toml_file(file)?);
+        }
+        let chosen = Viewpoint::fit(&loaded.solution().surfaces, aspect);
+        let chosen = chosen.context("the scene has no surfaces to look at")?;
+        Ok(Viewpoint {
+            eye: self.eye.unwrap_or(chosen.eye),
+            target: self.target.unwrap_or(chosen.target),
+            up: self.up.unwrap_or(chosen.up),
+            fov: self.fov.unwrap_or(chosen.fov),
+        })
+    }
+}
+
+pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
+    let path = arguments.input.display().to_string();
+    let output = output_path(arguments.output.as_deref(), &arguments.input, "png", json);
+    let is_exr = has_extension(&output, "exr");
+    if !is_exr && !has_extension(&output, "png") && output != Path::new("-") {
+        bail!(
+            "{}: a picture ends in .png or .exr; name it so",
+            output.display()
+        );
+    }
+    let loaded = load(&arguments.input)?;
+    let solution = loaded.solution();
+    if solution.mesh.faces.is_empty() {
+        bail!("{path}: it carries no mesh to draw; pack it without --no-mesh");
+    }
+    let mix = mix(&solution.lights, &arguments.only, &arguments.set).context(path)?;
+    let values = loaded.relight(&mix)?;
+    let exitance = solution.face_exitance(&mix);
+    let mesh = shown_mesh(&loaded);
+    let relit = Relit {
+        mesh: mesh.view(),
+        surfaces: &solution.surfaces,
+        irradiance: &values,
+        exitance: &exitance,
+    };
+    let (width, height) = arguments.size;
+    let aspect = width as f32 / height as f32;
+    let viewpoint = arguments.camera.viewpoint(&loaded, aspect)?;
+    let camera = Camera::new(viewpoint, width, height).context("camera")?;
+
+    let (bytes, exposure) = if is_exr {
+        (exr::encode_rgb(&render(&relit, &camera, f32::INFINITY)?)?, None)
+    } else {
+        let (pixmap, factor) = show(&relit, &camera, arguments.exposure, BACKGROUND)?;
+        (picture::encode_png(&pixmap)?, Some(factor))
+    };
+    write_file(&output, &bytes)?;
+    let exposed = exposure.map_or("linear, unexposed".to_owned(), |e| format!("exposure {e}"));
+    eprintln!("{}: {width}x{height}, {exposed}", output.display());
+    Ok(Outcome::done(json!({
+        "file": output,
+        "width": width,
+        "height": height,
+        "exposure": exposure,
+        "mix": solution.lights.iter().zip(&mix).map(|(light, weight)| {
+            json!({"name": light.name, "weight": weight.to_array()})
+        }).collect::<Vec<_>>(),
+        "camera": {
+            "eye": viewpoint.eye.to_array(),
+            "target": viewpoint.target.to_array(),
+            "up": viewpoint.up.to_array(),
+            "fov": viewpoint.fov,
+        },
+    })))
+}
+
+fn has_extension(path: &Path, extension: &str) -> bool {
+    path.extension()
+        .is_some_and(|found| found.eq_ignore_ascii_case(extension))
+}
+
+/// The mesh as it is drawn: where the values are radiosity, nothing is left to reflect.
+fn shown_mesh(loaded: &Loaded) -> OwnedMesh {
+    let mut mesh = loaded.solution().mesh.clone();
+    if loaded.is_radiosity() {
+        for element in &mut mesh.elements {
+            element.reflectance = Rgb::WHITE;
+        }
+    }
+    mesh
+}

@@ -1,0 +1,99 @@
+//! How far two relit states differ on a display.
+//!
+//! The exposure puts the exact state's white, the 98th percentile of its luminance over elements,
+//! at 1; both states are clipped and sRGB-encoded to `255 srgb(E / white)`, kept as floats, and the
+//! largest difference over elements and channels is the error, in *display codes* (DESIGN
+//! section 7). Measured on irradiance, which is what is packed, and on what is shown, `M + rho E`.
+
+use relume::color::Rgb;
+use relume::tone::{Exposure, srgb_encode};
+
+use crate::picture::white;
+
+/// Largest difference between two states, in display codes.
+#[must_use]
+pub fn max_codes(exact: &[Rgb], found: &[Rgb]) -> f32 {
+    let exposure = Exposure::for_white(white(exact.iter().copied())).factor();
+    let code = |value: Rgb| (value * exposure).map(|linear| 255.0 * srgb_encode(linear));
+    exact
+        .iter()
+        .zip(found)
+        .map(|(exact, found)| (code(*exact) - code(*found)).map(f32::abs).max_channel())
+        .fold(0.0, f32::max)
+}
+
+/// A mix to be tried, with its name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TestMix {
+    /// What it is, for people.
+    pub name: String,
+    /// One weight per light.
+    pub weights: Vec<Rgb>,
+}
+
+/// Mixes on which packing is judged: all lights on, each alone, and 64 dimmings.
+///
+/// A third of the dimmings is uniform in [0, 1], a third on or off, a third log-uniform over three
+/// decades; they are the same every time.
+#[must_use]
+pub fn test_mixes(nominal: &[Rgb], names: &[&str]) -> Vec<TestMix> {
+    let all_on = TestMix {
+        name: "all on".to_owned(),
+        weights: nominal.to_vec(),
+    };
+    let solos = names.iter().enumerate().map(|(light, name)| {
+        let mut weights = vec![Rgb::BLACK; nominal.len()];
+        weights[light] = nominal[light];
+        TestMix {
+            name: format!("{name} alone"),
+            weights,
+        }
+    });
+    let dimmings = (0..64_u64).map(|state| {
+        let weights = nominal.iter().zip(0_u64..).map(|(emission, light)| {
+            let noise = unit_noise(state << 32 | light);
+            *emission
+                * match state % 3 {
+                    0 => noise,
+                    1 => noise.round(),
+                    _ => 10.0_f32.powf(-3.0 * noise),
+                }
+        });
+        TestMix {
+            name: format!("dimming {state}"),
+            weights: weights.collect(),
+        }
+    });
+    std::iter::once(all_on).chain(solos).chain(dimmings).collect()
+}
+
+/// A number in [0, 1) for every seed: SplitMix64 (Steele, Lea and Flood 2014), top 24 bits.
+fn unit_noise(seed: u64) -> f32 {
+    let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 40) as f32 / (1_u32 << 24) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_display_code_at_white_is_one() {
+        let exact = vec![Rgb::WHITE; 100];
+        let mut found = exact.clone();
+        found[3].g = relume::tone::srgb_decode(254.0 / 255.0);
+        assert!((max_codes(&exact, &found) - 1.0).abs() < 1e-3);
+        assert_eq!(max_codes(&exact, &exact), 0.0);
+    }
+
+    #[test]
+    fn mixes_cover_all_solos_and_dimmings() {
+        let mixes = test_mixes(&[Rgb::WHITE, Rgb::splat(2.0)], &["a", "b"]);
+        assert_eq!(mixes.len(), 1 + 2 + 64);
+        assert_eq!(mixes[2].weights, [Rgb::BLACK, Rgb::splat(2.0)]);
+        assert!(mixes.iter().all(|mix| mix.weights.iter().all(|w| w.is_legal())));
+        assert_eq!(mixes, test_mixes(&[Rgb::WHITE, Rgb::splat(2.0)], &["a", "b"]));
+    }
+}

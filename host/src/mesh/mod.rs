@@ -1,0 +1,192 @@
+//! Meshing on the host: spacing from the scene's size, faces that light reaches, textures.
+
+mod reach;
+
+use relume::mesh::{
+    Counts, Element, Face, Mesh, MeshError, MeshSink, Patch, Side, Spacing, subdivide,
+};
+use relume::scene::Scene;
+
+use crate::bvh::Bvh;
+use crate::scene::OwnedScene;
+
+/// Elements that the default spacing aims at.
+const DEFAULT_ELEMENTS: f32 = 8000.0;
+
+/// Elements along the edge of a patch, by default.
+const ELEMENTS_PER_PATCH_EDGE: f32 = 4.0;
+
+/// Most faces, patches and elements that are built; their ids would be good for more, memory not.
+const LIMIT: usize = 1 << 25;
+
+/// A mesh that owns its parts.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct OwnedMesh {
+    /// The faces.
+    pub faces: Vec<Face>,
+    /// The patches.
+    pub patches: Vec<Patch>,
+    /// The elements.
+    pub elements: Vec<Element>,
+}
+
+impl OwnedMesh {
+    /// The solver's view of it.
+    #[must_use]
+    pub fn view(&self) -> Mesh<'_> {
+        Mesh {
+            faces: &self.faces,
+            patches: &self.patches,
+            elements: &self.elements,
+        }
+    }
+}
+
+fn push<T>(list: &mut Vec<T>, item: T, full: MeshError) -> Result<(), MeshError> {
+    if list.len() >= LIMIT {
+        return Err(full);
+    }
+    list.push(item);
+    Ok(())
+}
+
+impl MeshSink for OwnedMesh {
+    fn face(&mut self, face: Face) -> Result<(), MeshError> {
+        push(&mut self.faces, face, MeshError::TooManyFaces { limit: LIMIT })
+    }
+
+    fn patch(&mut self, patch: Patch) -> Result<(), MeshError> {
+        let full = MeshError::TooManyPatches { limit: LIMIT };
+        push(&mut self.patches, patch, full)
+    }
+
+    fn element(&mut self, element: Element) -> Result<(), MeshError> {
+        let full = MeshError::TooManyElements { limit: LIMIT };
+        push(&mut self.elements, element, full)
+    }
+}
+
+/// Spacing from the scene's size, where the user gave none.
+///
+/// Elements: an edge of `sqrt(A / 8000)`, with `A` the area of all reflecting surfaces, one side
+/// each, and `A / 8000` the area of one of 8000 squares. Patches: four elements long.
+#[must_use]
+pub fn spacing(scene: &Scene, patch: Option<f32>, element: Option<f32>) -> Spacing {
+    let area: f32 = scene
+        .surfaces()
+        .iter()
+        .filter(|surface| !surface.reflectance().is_black())
+        .map(|surface| surface.polygon().area())
+        .sum();
+    // A scene of lamps alone has no elements to size.
+    let area = if area > 0.0 { area } else { 1.0 };
+    let element = element
+        .or(patch.map(|length| length / ELEMENTS_PER_PATCH_EDGE))
+        .unwrap_or_else(|| (area / DEFAULT_ELEMENTS).sqrt());
+    Spacing {
+        patch: patch.unwrap_or(element * ELEMENTS_PER_PATCH_EDGE),
+        element,
+    }
+}
+
+/// Divides the scene; faces that no light reaches are left out before anything is numbered.
+///
+/// # Errors
+/// [`MeshError`] as [`subdivide`] reports it.
+pub fn build(scene: &OwnedScene, view: &Scene, spacing: Spacing, bvh: &Bvh) -> Result<OwnedMesh, MeshError> {
+    let reached = reach::reached_faces(view, spacing, bvh)?;
+    let mut mesh = OwnedMesh::default();
+    let keep = |surface: u32, side: Side| reached.contains(surface, side);
+    let _: Counts = subdivide(view, spacing, keep, &mut mesh)?;
+    apply_textures(scene, &mut mesh);
+    Ok(mesh)
+}
+
+/// Gives the elements of textured faces the mean reflectance of their own part of the texture.
+fn apply_textures(scene: &OwnedScene, mesh: &mut OwnedMesh) {
+    for face in &mesh.faces {
+        let texture = scene.textures.get(face.surface as usize);
+        let Some(texture) = texture.and_then(Option::as_ref) else {
+            continue;
+        };
+        let texture = match face.side {
+            Side::Front => texture.clone(),
+            Side::Back => texture.flipped(),
+        };
+        let range = face.element_range();
+        let own = mesh.elements.get_mut(range.start as usize..range.end as usize);
+        for element in own.unwrap_or_default() {
+            element.reflectance = texture.mean_over(element.from, element.to);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+    use relume::color::Rgb;
+    use relume::scene::{Emission, Surface};
+
+    fn surface(vertices: [Vec3; 4], reflectance: f32) -> Surface {
+        Surface::new(0, &vertices, Rgb::splat(reflectance)).unwrap()
+    }
+
+    /// Walls of the box from -size to size around `at`, all facing inwards.
+    fn walls(at: Vec3, size: f32) -> Vec<[Vec3; 4]> {
+        [Vec3::X, Vec3::Y, Vec3::Z]
+            .into_iter()
+            .flat_map(|axis| [axis, -axis])
+            .map(|out| {
+                let (u, v) = out.any_orthonormal_pair();
+                let corners = [out - u - v, out - u + v, out + u + v, out + u - v];
+                let inwards = (corners[1] - corners[0])
+                    .cross(corners[2] - corners[0])
+                    .dot(out)
+                    < 0.0;
+                let corners = corners.map(|corner| at + corner * size);
+                if inwards {
+                    corners
+                } else {
+                    let [a, b, c, d] = corners;
+                    [a, d, c, b]
+                }
+            })
+            .collect()
+    }
+
+    /// A two-sided room with a small lamp and a closed box inside: only the room's inside and the
+    /// box's outside are lit.
+    #[test]
+    fn faces_that_no_light_reaches_are_dropped() {
+        let mut surfaces: Vec<Surface> = walls(Vec3::ZERO, 2.0)
+            .into_iter()
+            .chain(walls(Vec3::new(0.5, -1.0, 0.3), 0.4))
+            .map(|wall| surface(wall, 0.5).two_sided())
+            .collect();
+        let lamp = [(0.0, 0.0), (0.1, 0.0), (0.1, 0.1), (0.0, 0.1)];
+        let lamp = lamp.map(|(x, z)| Vec3::new(x, 1.9, z));
+        let emission = Emission {
+            light: 0,
+            share: Rgb::WHITE,
+        };
+        surfaces.push(surface(lamp, 0.0).emitting(12, emission).unwrap());
+        let scene = OwnedScene {
+            surfaces,
+            ..OwnedScene::default()
+        };
+        let view = Scene::new(&scene.surfaces, &[], 1).unwrap();
+        let spacing = Spacing {
+            patch: 1.0,
+            element: 0.5,
+        };
+        let mesh = build(&scene, &view, spacing, &Bvh::new(&scene.surfaces)).unwrap();
+        let faces: Vec<(u32, Side)> = mesh.faces.iter().map(|f| (f.surface, f.side)).collect();
+        let expected: Vec<(u32, Side)> = (0..6)
+            .map(|i| (i, Side::Front))
+            .chain((6..12).map(|i| (i, Side::Back)))
+            .chain([(12, Side::Front)])
+            .collect();
+        assert_eq!(faces, expected);
+    }
+}

@@ -1,0 +1,367 @@
+//! Irradiance at surface points and at elements, for every light by itself.
+//!
+//! A point belongs to the nearest surface within 1e-3 of the diagonal of the scene's bounding box
+//! whose normal, of either side, agrees within 10 degrees; it gets the value of the element that
+//! holds it. A side that no light reaches has no elements and gets 0; a side of reflectance 0 is
+//! not stored and gives no value.
+
+use std::collections::HashMap;
+use std::io;
+
+use glam::{Vec2, Vec3};
+use relume::color::Rgb;
+use relume::geometry::Polygon;
+use relume::mesh::{Element, Face, Side};
+use serde::Deserialize;
+use thiserror::Error;
+
+use crate::solution::Solution;
+
+/// Reach of a surface, in diagonals of the bounding box.
+const REACH: f32 = 1e-3;
+
+/// Cosine of the largest angle between a point's normal and its surface's: 10 degrees.
+const LEAST_COSINE: f32 = 0.984_807_73;
+
+/// A surface point to be probed.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProbePoint {
+    x: f32,
+    y: f32,
+    z: f32,
+    nx: f32,
+    ny: f32,
+    nz: f32,
+}
+
+/// Why points or values cannot be read or written.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ProbeError {
+    /// A row is no point.
+    #[error("{0}; the header must be x,y,z,nx,ny,nz and every value a number")]
+    Points(#[from] csv::Error),
+    /// A value is NaN or infinite, or the normal is zero.
+    #[error("line {line}: a value is not finite, or the normal is zero")]
+    Illegal {
+        /// Line of the file, from 1.
+        line: u64,
+    },
+    /// There is no place to look for points.
+    #[error("it carries no mesh, so points have no place in it; pack without --no-mesh, or use --elements")]
+    NoMesh,
+    /// Direct light was not kept apart.
+    #[error("direct light was not kept apart; bake with --split-direct")]
+    NoDirect,
+    /// Writing failed.
+    #[error("{0}")]
+    Io(#[from] io::Error),
+}
+
+/// Reads points from CSV with the header `x,y,z,nx,ny,nz`.
+///
+/// # Errors
+/// [`ProbeError`] that names the line.
+pub fn read_points(text: &[u8]) -> Result<Vec<ProbePoint>, ProbeError> {
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .from_reader(text);
+    let mut points = Vec::new();
+    for (row, line) in reader.deserialize::<ProbePoint>().zip(2..) {
+        let point = row?;
+        let normal = point.normal();
+        if !(point.position().is_finite() && normal.is_finite() && normal.length() > 0.0) {
+            return Err(ProbeError::Illegal { line });
+        }
+        points.push(point);
+    }
+    Ok(points)
+}
+
+impl ProbePoint {
+    /// Where it is.
+    #[must_use]
+    pub const fn position(&self) -> Vec3 {
+        Vec3::new(self.x, self.y, self.z)
+    }
+
+    /// Where it faces; any length above zero.
+    #[must_use]
+    pub const fn normal(&self) -> Vec3 {
+        Vec3::new(self.nx, self.ny, self.nz)
+    }
+}
+
+/// Which values to give.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Direct and indirect light together.
+    Total,
+    /// Direct light only.
+    Direct,
+}
+
+/// What a probe of points found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Probed {
+    /// The CSV: `point,light,er,eg,eb`.
+    pub csv: Vec<u8>,
+    /// Points without a value.
+    pub missing: usize,
+}
+
+/// Irradiance at points, as CSV with the header `point,light,er,eg,eb`.
+///
+/// # Errors
+/// [`ProbeError::NoMesh`] and [`ProbeError::NoDirect`].
+pub fn probe_points(
+    solution: &Solution,
+    points: &[ProbePoint],
+    part: Part,
+) -> Result<Probed, ProbeError> {
+    if solution.mesh.faces.is_empty() {
+        return Err(ProbeError::NoMesh);
+    }
+    check_part(solution, part)?;
+    let places = Places::new(solution);
+    let mut table = Table::new("point")?;
+    let mut missing = 0;
+    for (point, number) in points.iter().zip(0..) {
+        let place = places.find(point.position(), point.normal().normalize());
+        missing += usize::from(place == Place::None);
+        for (light, tag) in solution.lights.iter().zip(0..) {
+            let value = match place {
+                Place::Element(element) => value(solution, element, tag, part),
+                Place::Unlit => Rgb::BLACK,
+                Place::None => Rgb::splat(f32::NAN),
+            };
+            table.row(number, &light.name, value)?;
+        }
+    }
+    Ok(Probed {
+        csv: table.finish()?,
+        missing,
+    })
+}
+
+/// Irradiance per element, as CSV with the header `element,light,er,eg,eb`.
+///
+/// # Errors
+/// [`ProbeError::NoDirect`].
+pub fn probe_elements(solution: &Solution, part: Part) -> Result<Vec<u8>, ProbeError> {
+    check_part(solution, part)?;
+    let mut table = Table::new("element")?;
+    let lights = solution.lights.len();
+    let elements = solution.contributions.len().checked_div(lights).unwrap_or(0);
+    for element in 0..elements {
+        for (light, tag) in solution.lights.iter().zip(0..) {
+            table.row(element, &light.name, value(solution, element, tag, part))?;
+        }
+    }
+    table.finish()
+}
+
+fn check_part(solution: &Solution, part: Part) -> Result<(), ProbeError> {
+    if part == Part::Direct && solution.direct.is_none() {
+        return Err(ProbeError::NoDirect);
+    }
+    Ok(())
+}
+
+fn value(solution: &Solution, element: usize, light: usize, part: Part) -> Rgb {
+    let values = match part {
+        Part::Total => Some(solution.element(element)),
+        Part::Direct => solution.element_direct(element),
+    };
+    let value = values.and_then(|values| values.get(light));
+    value.copied().unwrap_or_default()
+}
+
+struct Table(csv::Writer<Vec<u8>>);
+
+impl Table {
+    fn new(first: &str) -> Result<Self, ProbeError> {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer.write_record([first, "light", "er", "eg", "eb"])?;
+        Ok(Self(writer))
+    }
+
+    /// Floats are written with as many digits as bring them back.
+    fn row(&mut self, number: usize, light: &str, value: Rgb) -> Result<(), ProbeError> {
+        let [r, g, b] = value.to_array().map(written);
+        self.0.write_record([&number.to_string(), light, &r, &g, &b])?;
+        Ok(())
+    }
+
+    fn finish(self) -> Result<Vec<u8>, ProbeError> {
+        self.0.into_inner().map_err(|e| e.into_error().into())
+    }
+}
+
+fn written(value: f32) -> String {
+    if value.is_nan() {
+        "nan".to_owned()
+    } else {
+        value.to_string()
+    }
+}
+
+/// Where a point lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Place {
+    Element(usize),
+    Unlit,
+    None,
+}
+
+/// The sides of a solution's surfaces, to be searched by place.
+struct Places<'a> {
+    solution: &'a Solution,
+    faces: HashMap<(u32, Side), &'a Face>,
+    reach: f32,
+}
+
+impl<'a> Places<'a> {
+    fn new(solution: &'a Solution) -> Self {
+        let diagonal = solution
+            .bounds()
+            .map_or(0.0, |(low, high)| (high - low).length());
+        let faces = solution.mesh.faces.iter();
+        Self {
+            solution,
+            faces: faces.map(|face| ((face.surface, face.side), face)).collect(),
+            reach: REACH * diagonal,
+        }
+    }
+
+    fn find(&self, position: Vec3, normal: Vec3) -> Place {
+        let sides = self.solution.surfaces.iter().zip(0..).filter_map(|(outline, surface)| {
+            let cosine = outline.normal().dot(normal);
+            let side = if cosine >= LEAST_COSINE {
+                Side::Front
+            } else if cosine <= -LEAST_COSINE {
+                Side::Back
+            } else {
+                return None;
+            };
+            let distance = distance(outline, position);
+            (distance <= self.reach).then_some((distance, surface, side))
+        });
+        let nearest = sides.min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, surface, side)) = nearest else {
+            return Place::None;
+        };
+        match self.faces.get(&(surface, side)) {
+            None => Place::Unlit,
+            Some(face) => self
+                .element_at(face, position)
+                .map_or(Place::None, Place::Element),
+        }
+    }
+
+    /// The element of a face that holds a point, or comes closest to it.
+    fn element_at(&self, face: &Face, position: Vec3) -> Option<usize> {
+        let at = face.polygon.parameters(position);
+        let range = face.element_range();
+        let elements = self.solution.mesh.elements.get(range.start as usize..range.end as usize)?;
+        let is_triangle = face.polygon.is_triangle();
+        let misses = elements.iter().map(|e| outside(e, at, is_triangle));
+        let nearest = (range.start as usize..)
+            .zip(misses)
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        nearest.map(|(element, _)| element)
+    }
+}
+
+/// By how much the parameters leave an element, in its own size; 0 inside.
+fn outside(element: &Element, at: Vec2, is_triangle: bool) -> f32 {
+    let local = (at - element.from) / (element.to - element.from);
+    let beyond = if is_triangle {
+        local.x + local.y - 1.0
+    } else {
+        local.max_element() - 1.0
+    };
+    (-local.min_element()).max(beyond).max(0.0)
+}
+
+/// Distance from a point to a polygon.
+fn distance(polygon: &Polygon, point: Vec3) -> f32 {
+    let normal = polygon.normal();
+    let height = (point - polygon.origin()).dot(normal);
+    let is_above = polygon
+        .edges()
+        .all(|(a, b)| (b - a).cross(point - a).dot(normal) >= 0.0);
+    if is_above {
+        return height.abs();
+    }
+    polygon
+        .edges()
+        .map(|(a, b)| {
+            let edge = b - a;
+            let along = ((point - a).dot(edge) / edge.length_squared()).clamp(0.0, 1.0);
+            (point - (a + edge * along)).length()
+        })
+        .fold(f32::INFINITY, f32::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bake::{Settings, bake};
+    use crate::builtin;
+    use std::ops::ControlFlow;
+
+    fn room() -> Solution {
+        let settings = Settings {
+            patch: Some(1.0),
+            element: Some(0.5),
+            residual: 0.1,
+            ..Settings::default()
+        };
+        let scene = builtin::paper_room(builtin::PaperLamps::One).unwrap().scene;
+        bake(&scene, &settings, &mut |_| ControlFlow::Continue(())).unwrap()
+    }
+
+    #[test]
+    fn element_centres_find_their_elements() {
+        let solution = room();
+        let places = Places::new(&solution);
+        let mesh = solution.mesh.view();
+        for (element, number) in mesh.elements.iter().zip(0..) {
+            let outline = mesh.element_polygon(element).unwrap();
+            let found = places.find(outline.center(), outline.normal());
+            assert_eq!(found, Place::Element(number));
+        }
+    }
+
+    #[test]
+    fn points_off_the_surface_or_turned_away_have_no_value() {
+        let solution = room();
+        let places = Places::new(&solution);
+        let floor = Vec3::new(0.6, 0.0, 0.6);
+        assert!(matches!(places.find(floor, Vec3::Y), Place::Element(_)));
+        assert_eq!(places.find(floor, -Vec3::Y), Place::Unlit);
+        assert_eq!(places.find(floor + Vec3::Y * 0.1, Vec3::Y), Place::None);
+        assert_eq!(places.find(floor, Vec3::X), Place::None);
+        let points = read_points(b"x,y,z,nx,ny,nz\n0.6,0,0.6,0,2,0\n9,9,9,0,1,0\n").unwrap();
+        let probed = probe_points(&solution, &points, Part::Total).unwrap();
+        let text = String::from_utf8(probed.csv).unwrap();
+        assert_eq!(probed.missing, 1);
+        assert!(text.starts_with("point,light,er,eg,eb\n0,light_0,"), "{text}");
+        assert!(text.ends_with("1,light_0,nan,nan,nan\n"), "{text}");
+    }
+
+    #[test]
+    fn bad_points_name_their_line() {
+        for (text, line) in [
+            ("x,y,z,nx,ny,nz\n0,0,0,0,0,0\n", "line 2"),
+            ("x,y,z,nx,ny,nz\n0,0,0,0,1,0\n0,0,0,0,nan,0\n", "line 3"),
+            ("x,y,z,nx,ny,nz\n0,0,0,0,1,0\n0,0\n", "line: 3"),
+            ("a,b\n1,2\n", "x"),
+        ] {
+            let error = read_points(text.as_bytes()).unwrap_err().to_string();
+            assert!(error.contains(line), "{text:?}: {error}");
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! The solution: mesh and contributions in `f32`, as baked, and its file.
+
+mod file;
+
+use glam::Vec3;
+use relume::color::Rgb;
+use relume::geometry::Polygon;
+use relume::mesh::Spacing;
+
+pub use file::{FileError, MAGIC, read, write};
+
+use crate::mesh::OwnedMesh;
+
+/// A light of a solution.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SolutionLight {
+    /// Its name.
+    pub name: String,
+    /// Nominal mix weight.
+    pub emission: Rgb,
+    /// Unshot over emitted power when the bake ended.
+    pub residual: f32,
+}
+
+/// Contributions of every light to every element, with the mesh that they belong to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solution {
+    /// Outlines of all surfaces, lit or not: they hide what is behind them.
+    pub surfaces: Vec<Polygon>,
+    /// Faces, patches and elements.
+    pub mesh: OwnedMesh,
+    /// The lights, in the order of their tags.
+    pub lights: Vec<SolutionLight>,
+    /// Irradiance by a light at unit emission, W/m2; element by element, light inside.
+    pub contributions: Vec<Rgb>,
+    /// The direct part of it, where it was kept apart.
+    pub direct: Option<Vec<Rgb>>,
+    /// Rows that the bake evaluated.
+    pub rows: u32,
+    /// Longest edges that the mesh was made for, in the scene's units.
+    pub spacing: Spacing,
+}
+
+impl Solution {
+    /// Contributions of all lights to one element; empty for a number out of range.
+    #[must_use]
+    pub fn element(&self, element: usize) -> &[Rgb] {
+        slice_of(&self.contributions, element, self.lights.len())
+    }
+
+    /// The direct part of them; `None` when it was not kept apart.
+    #[must_use]
+    pub fn element_direct(&self, element: usize) -> Option<&[Rgb]> {
+        let direct = self.direct.as_ref()?;
+        Some(slice_of(direct, element, self.lights.len()))
+    }
+
+    /// The mix in which every light has its nominal emission.
+    #[must_use]
+    pub fn nominal_mix(&self) -> Vec<Rgb> {
+        self.lights.iter().map(|light| light.emission).collect()
+    }
+
+    /// Irradiance of every element under a mix, W/m2.
+    #[must_use]
+    pub fn relight(&self, mix: &[Rgb]) -> Vec<Rgb> {
+        (0..self.mesh.elements.len())
+            .map(|element| {
+                let contributions = self.element(element).iter().zip(mix);
+                contributions.fold(Rgb::BLACK, |sum, (value, weight)| sum + *value * *weight)
+            })
+            .collect()
+    }
+
+    /// Exitance of every face under a mix, W/m2; black for faces that do not emit.
+    #[must_use]
+    pub fn face_exitance(&self, mix: &[Rgb]) -> Vec<Rgb> {
+        let exitance = |face: &relume::mesh::Face| {
+            let emission = face.emission?;
+            Some(emission.share * *mix.get(emission.light as usize)?)
+        };
+        let faces = self.mesh.faces.iter();
+        faces.map(|f| exitance(f).unwrap_or_default()).collect()
+    }
+
+    /// Two opposite corners of the box around all surfaces; `None` without surfaces.
+    #[must_use]
+    pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
+        let vertices = || self.surfaces.iter().flat_map(|polygon| polygon.vertices());
+        let low = vertices().copied().reduce(Vec3::min)?;
+        let high = vertices().copied().reduce(Vec3::max)?;
+        Some((low, high))
+    }
+}
+
+fn slice_of(values: &[Rgb], element: usize, lights: usize) -> &[Rgb] {
+    let start = element.saturating_mul(lights);
+    values
+        .get(start..start.saturating_add(lights))
+        .unwrap_or_default()
+}
