@@ -75,7 +75,7 @@ impl Default for Settings {
         Self {
             patch: None,
             element: None,
-            residual: 1e-3,
+            residual: 1e-4,
             shots: None,
             plain: false,
             split_direct: false,

@@ -35,3 +35,5 @@ pub mod export;
 pub mod preview;
 
 pub mod reference;
+
+pub mod cli;

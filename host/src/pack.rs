@@ -6,7 +6,6 @@ use relume::color::Rgb;
 use relume::geometry::Polygon;
 use relume::mesh::{Element, Face, Patch, Spacing};
 use relume::relight::{RelightError, float_weights, relight};
-use relume::scene::Surface;
 use thiserror::Error;
 
 use crate::display_error::{TestMix, max_codes, test_mixes};
@@ -61,18 +60,15 @@ pub fn pack(solution: &Solution, format: Format) -> Result<Vec<u8>, PackError> {
             })
         })
         .collect::<Result<_, PackError>>()?;
-    let surfaces: Vec<Surface> = solution
-        .surfaces
-        .iter()
-        .filter_map(|polygon| Surface::new(0, polygon.vertices(), Rgb::BLACK).ok())
-        .collect();
     let contents = Contents {
         code: format.code,
         channels: format.channels,
         quantity: format.quantity,
         lights: &entries,
         elements: solution.mesh.elements.len() as u32,
-        mesh: format.mesh.then(|| (&surfaces[..], solution.mesh.view())),
+        mesh: format
+            .mesh
+            .then(|| (&solution.surfaces[..], solution.mesh.view())),
     };
     let mut bytes = vec![0; atlas::size(&contents)?];
     let lights = solution.lights.len();

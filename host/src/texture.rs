@@ -286,7 +286,11 @@ mod tests {
     fn a_triangle_weights_texels_by_covered_area() {
         // The lower left half of 2 x 2 texels: one texel whole, two halves, one not at all.
         let half = texture(2, &[0.8, 0.4, 0.2, 0.9], &SQUARE[..3]);
-        let mirrored = texture(2, &[0.8, 0.4, 0.2, 0.9], &[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
+        let mirrored = texture(
+            2,
+            &[0.8, 0.4, 0.2, 0.9],
+            &[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]],
+        );
         let expected = (0.8 + 0.5 * 0.4 + 0.5 * 0.2) / 2.0;
         assert!((mirrored.mean_over(WHOLE.0, WHOLE.1).r - expected).abs() < 1e-6);
         let expected = (0.4 + 0.5 * 0.8 + 0.5 * 0.9) / 2.0;
@@ -317,7 +321,10 @@ mod tests {
         let point = texture(2, &red, &[[0.75, 0.25]; 4]);
         assert!((point.mean_over(WHOLE.0, WHOLE.1).r - 0.3).abs() < 1e-6);
         for bad in [f32::NAN, f32::INFINITY, -f32::INFINITY, 1e30] {
-            for corners in [[[0.0, 0.0], [bad, 0.0], [0.0, bad]], [[0.0, 0.0], [0.0, bad], [0.0, 1.0]]] {
+            for corners in [
+                [[0.0, 0.0], [bad, 0.0], [0.0, bad]],
+                [[0.0, 0.0], [0.0, bad], [0.0, 1.0]],
+            ] {
                 let mean = texture(2, &red, &corners).mean_over(WHOLE.0, WHOLE.1);
                 assert!((0.0..=MAX_REFLECTANCE).contains(&mean.r), "{bad}: {mean:?}");
             }

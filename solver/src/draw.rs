@@ -425,7 +425,7 @@ mod tests {
                 scale: Scale::ONE,
             }],
             elements: 2,
-            mesh: Some((&surfaces, storage.mesh())),
+            mesh: Some((&surfaces.map(|s| *s.polygon()), storage.mesh())),
         };
         let mut bytes = vec![0; size(&contents).unwrap()];
         write(&contents, |_, _| Rgb::WHITE, &mut bytes).unwrap();

@@ -81,7 +81,10 @@ pub(super) fn assemble(
 /// Mean of each material's whole image, for faces that do not say where they lie in it.
 fn texture_means(materials: &[Material]) -> Vec<Rgb> {
     let mean = |material: &Material| material.texture.as_ref().map(|image| image.mean());
-    materials.iter().map(|material| mean(material).unwrap_or(Rgb::WHITE)).collect()
+    materials
+        .iter()
+        .map(|material| mean(material).unwrap_or(Rgb::WHITE))
+        .collect()
 }
 
 fn surface(
@@ -93,17 +96,22 @@ fn surface(
     repairs: &mut Repairs,
 ) -> Result<(Surface, Option<SurfaceTexture>), SurfaceError> {
     let has_places = outline.uv.len() == outline.vertices.len();
-    let texture = material.texture.as_ref().filter(|_| has_places).map(|image| SurfaceTexture {
-        image: image.clone(),
-        factor: material.reflectance.to_array(),
-        corners: outline.uv,
-    });
+    let texture = material
+        .texture
+        .as_ref()
+        .filter(|_| has_places)
+        .map(|image| SurfaceTexture {
+            image: image.clone(),
+            factor: material.reflectance.to_array(),
+            corners: outline.uv,
+        });
     if material.texture.is_some() && !has_places {
         repairs.missing_texture_coordinates += 1;
     }
     let whole = |texture: &SurfaceTexture| texture.unclamped_mean_over(Vec2::ZERO, Vec2::ONE);
-    let reflectance =
-        texture.as_ref().map_or_else(|| material.reflectance * image_mean, whole);
+    let reflectance = texture
+        .as_ref()
+        .map_or_else(|| material.reflectance * image_mean, whole);
     let clamped = clamp_reflectance(reflectance);
     if clamped != reflectance {
         repairs.clamped_reflectances += 1;
@@ -135,8 +143,13 @@ impl Groups {
             tags: HashMap::new(),
         };
         for entry in entries {
-            let tag = *groups.tags.entry(entry.name.clone()).or_insert(groups.lights.len());
-            if let (Some(light), Some(count)) = (groups.lights.get_mut(tag), groups.entries.get_mut(tag)) {
+            let tag = *groups
+                .tags
+                .entry(entry.name.clone())
+                .or_insert(groups.lights.len());
+            if let (Some(light), Some(count)) =
+                (groups.lights.get_mut(tag), groups.entries.get_mut(tag))
+            {
                 light.emission = light.emission.max(entry.emission);
                 light.importance = light.importance.max(entry.importance);
                 *count += 1;
@@ -162,7 +175,11 @@ impl Groups {
         let share = if is_alone {
             Rgb::WHITE
         } else {
-            Rgb::new(ratio(r, nominal.r), ratio(g, nominal.g), ratio(b, nominal.b))
+            Rgb::new(
+                ratio(r, nominal.r),
+                ratio(g, nominal.g),
+                ratio(b, nominal.b),
+            )
         };
         Some(Emission {
             light: u32::try_from(tag).ok()?,
@@ -214,7 +231,11 @@ mod tests {
         let mut bank = lamp("bank", [1.0, 4.0, 0.0]);
         bank.importance = 0.5;
         let draft = Draft {
-            entries: vec![lamp("bank", [2.0, 1.0, 0.0]), lamp("red", [3.0, 0.0, 0.0]), bank],
+            entries: vec![
+                lamp("bank", [2.0, 1.0, 0.0]),
+                lamp("red", [3.0, 0.0, 0.0]),
+                bank,
+            ],
             replacements: vec![Replacement {
                 name: "red".to_owned(),
                 emission: Some(Rgb::BLACK),
@@ -223,8 +244,11 @@ mod tests {
             ..Draft::default()
         };
         let scene = assemble(Path::new("x"), draft, &mut Repairs::default()).unwrap();
-        let shares: Vec<_> =
-            scene.luminaires.iter().map(|l| (l.light(), l.share().to_array())).collect();
+        let shares: Vec<_> = scene
+            .luminaires
+            .iter()
+            .map(|l| (l.light(), l.share().to_array()))
+            .collect();
         let expected = [(0, [1.0, 0.25, 0.0]), (1, [1.0; 3]), (0, [0.5, 1.0, 0.0])];
         assert_eq!(shares, expected);
         let lights: Vec<_> = scene
@@ -232,15 +256,24 @@ mod tests {
             .iter()
             .map(|l| (l.name.as_str(), l.emission.to_array(), l.importance))
             .collect();
-        assert_eq!(lights, [("bank", [2.0, 4.0, 0.0], 1.0), ("red", [0.0; 3], 0.25)]);
+        assert_eq!(
+            lights,
+            [("bank", [2.0, 4.0, 0.0], 1.0), ("red", [0.0; 3], 0.25)]
+        );
     }
 
     #[test]
     fn surfaces_of_one_material_are_one_light() {
-        let glow = Glow { light: "tube".to_owned(), exitance: Rgb::new(5.0, 0.0, 1.0) };
+        let glow = Glow {
+            light: "tube".to_owned(),
+            exitance: Rgb::new(5.0, 0.0, 1.0),
+        };
         let mut draft = Draft::default();
         draft.add_material(Material::unknown(true));
-        draft.add_material(Material { glow: Some(glow), ..Material::unknown(false) });
+        draft.add_material(Material {
+            glow: Some(glow),
+            ..Material::unknown(false)
+        });
         draft.outlines = vec![triangle(0), triangle(1), triangle(1)];
         draft.find_area_lights();
         let scene = assemble(Path::new("x"), draft, &mut Repairs::default()).unwrap();
@@ -255,7 +288,11 @@ mod tests {
 
     #[test]
     fn textures_give_the_mean_and_bright_surfaces_are_clamped() {
-        let image = Image { width: 2, height: 1, texels: vec![[0.2; 3], [0.6; 3]] };
+        let image = Image {
+            width: 2,
+            height: 1,
+            texels: vec![[0.2; 3], [0.6; 3]],
+        };
         let textured = Material {
             reflectance: Rgb::new(1.0, 0.5, 3.0),
             texture: Some(Arc::new(image)),
@@ -270,19 +307,39 @@ mod tests {
         let scene = assemble(Path::new("x"), draft, &mut repairs).unwrap();
         let reflectance = |i: usize| scene.surfaces[i].reflectance().get().to_array();
         let close = |a: [f32; 3], b: [f32; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6);
-        assert!(close(reflectance(0), [0.2, 0.1, 0.6]), "{:?}", reflectance(0));
-        assert!(close(reflectance(1), [0.4, 0.2, 0.98]), "{:?}", reflectance(1));
+        assert!(
+            close(reflectance(0), [0.2, 0.1, 0.6]),
+            "{:?}",
+            reflectance(0)
+        );
+        assert!(
+            close(reflectance(1), [0.4, 0.2, 0.98]),
+            "{:?}",
+            reflectance(1)
+        );
         assert!(scene.textures[0].is_some() && scene.textures[1].is_none());
-        assert_eq!((repairs.clamped_reflectances, repairs.missing_texture_coordinates), (1, 1));
+        assert_eq!(
+            (
+                repairs.clamped_reflectances,
+                repairs.missing_texture_coordinates
+            ),
+            (1, 1)
+        );
     }
 
     #[test]
     fn too_many_lights_are_refused() {
         let draft = Draft {
-            entries: (0..=MAX_LIGHTS).map(|i| lamp(&i.to_string(), [1.0; 3])).collect(),
+            entries: (0..=MAX_LIGHTS)
+                .map(|i| lamp(&i.to_string(), [1.0; 3]))
+                .collect(),
             ..Draft::default()
         };
         let error = assemble(Path::new("many"), draft, &mut Repairs::default()).unwrap_err();
-        assert!(error.to_string().starts_with("many: 65536 lights, but at most 65535 fit"));
+        assert!(
+            error
+                .to_string()
+                .starts_with("many: 65536 lights, but at most 65535 fit")
+        );
     }
 }

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use ::gltf::json;
 use base64::Engine;
-use base64::engine::general_purpose::{GeneralPurpose, GeneralPurposeConfig};
 use base64::engine::DecodePaddingMode;
+use base64::engine::general_purpose::{GeneralPurpose, GeneralPurposeConfig};
 use json::accessor::{Accessor, ComponentType};
 use json::validation::Checked;
 use json::{Index, Root};
@@ -35,13 +35,16 @@ impl<'a> Data<'a> {
     ///
     /// # Errors
     /// A buffer that is missing, unreadable or shorter than the file says.
-    pub fn load(path: &Path, root: &'a Root, mut blob: Option<Vec<u8>>) -> Result<Self, ImportError> {
+    pub fn load(
+        path: &Path,
+        root: &'a Root,
+        mut blob: Option<Vec<u8>>,
+    ) -> Result<Self, ImportError> {
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         let mut buffers = Vec::new();
         for (buffer, number) in root.buffers.iter().zip(0..) {
-            let fault = |fault: String| {
-                ImportError::part(path, format_args!("buffer {number}"), fault)
-            };
+            let fault =
+                |fault: String| ImportError::part(path, format_args!("buffer {number}"), fault);
             let bytes = match (&buffer.uri, blob.take()) {
                 (Some(uri), kept) => {
                     blob = kept;
@@ -67,8 +70,14 @@ impl<'a> Data<'a> {
     }
 
     /// Positions or texture coordinates; integers are normalised if the accessor says so.
-    pub fn vectors<const N: usize>(&self, number: Index<Accessor>) -> Result<Vec<[f32; N]>, String> {
-        let normalized = self.root.get(number).is_some_and(|accessor| accessor.normalized);
+    pub fn vectors<const N: usize>(
+        &self,
+        number: Index<Accessor>,
+    ) -> Result<Vec<[f32; N]>, String> {
+        let normalized = self
+            .root
+            .get(number)
+            .is_some_and(|accessor| accessor.normalized);
         self.values(number, N, [0.0; N], |kind, bytes| {
             let mut vector = [0.0; N];
             for (slot, bytes) in vector.iter_mut().zip(bytes.chunks_exact(kind.size())) {
@@ -101,9 +110,14 @@ impl<'a> Data<'a> {
         zero: T,
         decode: impl Fn(ComponentType, &[u8]) -> Option<T>,
     ) -> Result<Vec<T>, String> {
-        let fault = |what: &str| format!("accessor {} {what}; export the file again", number.value());
-        let accessor = self.root.get(number).ok_or_else(|| fault("does not exist"))?;
-        let (Checked::Valid(kind), Checked::Valid(shape)) = (accessor.component_type, accessor.type_)
+        let fault =
+            |what: &str| format!("accessor {} {what}; export the file again", number.value());
+        let accessor = self
+            .root
+            .get(number)
+            .ok_or_else(|| fault("does not exist"))?;
+        let (Checked::Valid(kind), Checked::Valid(shape)) =
+            (accessor.component_type, accessor.type_)
         else {
             return Err(fault("has an unknown type"));
         };
@@ -118,13 +132,17 @@ impl<'a> Data<'a> {
         let mut values = match accessor.buffer_view {
             Some(view) => {
                 let elements = self.elements(view, offset, accessor.count.0, size);
-                let decoded = elements.ok_or_else(beyond)?.map(|bytes| decode(kind.0, bytes));
+                let decoded = elements
+                    .ok_or_else(beyond)?
+                    .map(|bytes| decode(kind.0, bytes));
                 decoded.collect::<Option<Vec<T>>>().ok_or_else(wrong_kind)?
             }
             // All zero; with more elements than the whole file has bytes it is damaged.
             None => {
                 let bytes: usize = self.buffers.iter().map(Vec::len).sum();
-                let count = usize::try_from(accessor.count.0).ok().filter(|count| *count <= bytes);
+                let count = usize::try_from(accessor.count.0)
+                    .ok()
+                    .filter(|count| *count <= bytes);
                 vec![zero; count.ok_or_else(beyond)?]
             }
         };
@@ -134,7 +152,8 @@ impl<'a> Data<'a> {
             };
             let (at, new) = (&sparse.indices, &sparse.values);
             let count = sparse.count.0;
-            let places = self.elements(at.buffer_view, at.byte_offset.0, count, index_kind.0.size());
+            let places =
+                self.elements(at.buffer_view, at.byte_offset.0, count, index_kind.0.size());
             let changes = self.elements(new.buffer_view, new.byte_offset.0, count, size);
             for (place, bytes) in places.ok_or_else(beyond)?.zip(changes.ok_or_else(beyond)?) {
                 let place = unsigned(index_kind.0, place).ok_or_else(wrong_kind)?;
@@ -187,7 +206,11 @@ fn component(kind: ComponentType, normalized: bool, bytes: &[u8]) -> Option<f32>
         }
         _ => return None,
     };
-    Some(if normalized { (value / largest).max(-1.0) } else { value })
+    Some(if normalized {
+        (value / largest).max(-1.0)
+    } else {
+        value
+    })
 }
 
 /// A vertex number.
@@ -203,7 +226,9 @@ fn unsigned(kind: ComponentType, bytes: &[u8]) -> Option<u32> {
 /// What a URI stands for: data inside it, or a file beside the scene.
 fn resource(folder: &Path, uri: &str) -> Result<Vec<u8>, String> {
     if let Some(data) = uri.strip_prefix("data:") {
-        let encoded = data.split_once(',').filter(|(head, _)| head.ends_with(";base64"));
+        let encoded = data
+            .split_once(',')
+            .filter(|(head, _)| head.ends_with(";base64"));
         let (_, encoded) = encoded.ok_or("its data URI is not base64; export the file again")?;
         return BASE64
             .decode(encoded)
@@ -258,16 +283,31 @@ mod tests {
     #[test]
     fn accessors_are_read_with_offset_stride_and_type() {
         let floats = r#"{"bufferView":1,"componentType":5126,"count":1,"type":"VEC2"}"#;
-        assert_eq!(with(floats, |d| d.vectors::<2>(Index::new(0))), Ok(vec![[1.0, 2.0]]));
-        let shorts = r#"{"bufferView":0,"byteOffset":4,"componentType":5123,"count":2,"type":"SCALAR"}"#;
-        assert_eq!(with(shorts, |d| d.indices(Index::new(0))), Ok(vec![65535, 32768]));
+        assert_eq!(
+            with(floats, |d| d.vectors::<2>(Index::new(0))),
+            Ok(vec![[1.0, 2.0]])
+        );
+        let shorts =
+            r#"{"bufferView":0,"byteOffset":4,"componentType":5123,"count":2,"type":"SCALAR"}"#;
+        assert_eq!(
+            with(shorts, |d| d.indices(Index::new(0))),
+            Ok(vec![65535, 32768])
+        );
         let strided = r#"{"bufferView":3,"componentType":5121,"count":4,"type":"SCALAR"}"#;
-        assert_eq!(with(strided, |d| d.indices(Index::new(0))), Ok(vec![1, 255, 0, 0]));
-        let normal = r#"{"bufferView":0,"componentType":5121,"normalized":true,"count":3,"type":"VEC2"}"#;
+        assert_eq!(
+            with(strided, |d| d.indices(Index::new(0))),
+            Ok(vec![1, 255, 0, 0])
+        );
+        let normal =
+            r#"{"bufferView":0,"componentType":5121,"normalized":true,"count":3,"type":"VEC2"}"#;
         let values = with(normal, |d| d.vectors::<2>(Index::new(0))).unwrap();
         assert_eq!(values[2], [1.0, 1.0]);
-        let signed = r#"{"bufferView":0,"byteOffset":4,"componentType":5122,"count":1,"type":"VEC2"}"#;
-        assert_eq!(with(signed, |d| d.vectors::<2>(Index::new(0))), Ok(vec![[-1.0, -32768.0]]));
+        let signed =
+            r#"{"bufferView":0,"byteOffset":4,"componentType":5122,"count":1,"type":"VEC2"}"#;
+        assert_eq!(
+            with(signed, |d| d.vectors::<2>(Index::new(0))),
+            Ok(vec![[-1.0, -32768.0]])
+        );
     }
 
     #[test]
@@ -290,13 +330,19 @@ mod tests {
             r#"{"bufferView":0,"componentType":5125,"count":1,"type":"VEC2"}"#.to_owned(),
             format!(r#"{{"bufferView":0,"componentType":5126,"count":{huge},"type":"VEC2"}}"#),
             format!(r#"{{"componentType":5126,"count":{huge},"type":"VEC2"}}"#),
-            format!(r#"{{"bufferView":0,"byteOffset":{huge},"componentType":5126,"count":1,"type":"VEC2"}}"#),
+            format!(
+                r#"{{"bufferView":0,"byteOffset":{huge},"componentType":5126,"count":1,"type":"VEC2"}}"#
+            ),
         ];
         for accessor in cases {
             let fault = with(&accessor, |d| d.vectors::<2>(Index::new(0))).unwrap_err();
             assert!(fault.starts_with("accessor 0 "), "{accessor}: {fault}");
         }
-        assert!(with("", |d| d.indices(Index::new(7))).unwrap_err().contains("does not exist"));
+        assert!(
+            with("", |d| d.indices(Index::new(7)))
+                .unwrap_err()
+                .contains("does not exist")
+        );
     }
 
     #[test]
@@ -306,9 +352,19 @@ mod tests {
         let get = |uri: &str| resource(folder.path(), uri);
         assert_eq!(get("a%20b%25.bin"), Ok(vec![7]));
         assert_eq!(get("a b%.bin"), Ok(vec![7]));
-        assert_eq!(get("data:application/octet-stream;base64,AQI="), Ok(vec![1, 2]));
+        assert_eq!(
+            get("data:application/octet-stream;base64,AQI="),
+            Ok(vec![1, 2])
+        );
         assert_eq!(get("data:;base64,AQI"), Ok(vec![1, 2]));
-        for bad in ["data:text/plain,x", "data:;base64,*", "http://x/y", "none.bin", "%", ""] {
+        for bad in [
+            "data:text/plain,x",
+            "data:;base64,*",
+            "http://x/y",
+            "none.bin",
+            "%",
+            "",
+        ] {
             assert!(get(bad).is_err(), "{bad}");
         }
     }
@@ -317,7 +373,11 @@ mod tests {
     fn short_and_missing_buffers_are_named() {
         let root = root("");
         let error = Data::load(Path::new("x.glb"), &root, Some(vec![0; 15])).unwrap_err();
-        assert!(error.to_string().starts_with("x.glb, buffer 0: 15 bytes instead of 16"));
+        assert!(
+            error
+                .to_string()
+                .starts_with("x.glb, buffer 0: 15 bytes instead of 16")
+        );
         assert!(Data::load(Path::new("x.gltf"), &root, None).is_err());
     }
 }

@@ -51,7 +51,9 @@ pub(super) struct Placement {
 impl Placement {
     fn new(info: &json::texture::Info) -> Self {
         let extensions = info.extensions.as_ref();
-        let transform = extensions.and_then(|e| e.texture_transform.clone()).unwrap_or_default();
+        let transform = extensions
+            .and_then(|e| e.texture_transform.clone())
+            .unwrap_or_default();
         Self {
             set: transform.tex_coord.unwrap_or(info.tex_coord),
             offset: transform.offset.0.into(),
@@ -64,7 +66,10 @@ impl Placement {
     pub fn apply(&self, uv: [f32; 2]) -> Option<Vec2> {
         let scaled = Vec2::from(uv) * self.scale;
         let Vec2 { x: cos, y: sin } = self.rotation;
-        let turned = Vec2::new(scaled.x * cos + scaled.y * sin, scaled.y * cos - scaled.x * sin);
+        let turned = Vec2::new(
+            scaled.x * cos + scaled.y * sin,
+            scaled.y * cos - scaled.x * sin,
+        );
         let place = self.offset + turned;
         place.is_finite().then_some(place)
     }
@@ -93,13 +98,16 @@ impl Materials {
             Some(index) => {
                 let number = index.value();
                 let source = root.get(index);
-                let name = source.and_then(|material| material.name.as_deref()).unwrap_or_default();
+                let name = source
+                    .and_then(|material| material.name.as_deref())
+                    .unwrap_or_default();
                 let fault = |fault: String| {
                     ImportError::part(path, format_args!("material {number} ({name:?})"), fault)
                 };
                 let missing = || "does not exist; export the file again".to_owned();
                 let source = source.ok_or_else(missing).map_err(fault)?;
-                self.describe(data, root, source, number, repairs).map_err(fault)?
+                self.describe(data, root, source, number, repairs)
+                    .map_err(fault)?
             }
         };
         let described = Described {
@@ -179,7 +187,10 @@ impl Materials {
     ) -> Option<Arc<Image>> {
         let image = root.get(info.index).and_then(|texture| {
             let decode = || data.image(texture.source).map(Arc::new);
-            self.images.entry(texture.source.value()).or_insert_with(decode).clone()
+            self.images
+                .entry(texture.source.value())
+                .or_insert_with(decode)
+                .clone()
         });
         repairs.missing_textures += usize::from(image.is_none());
         image
@@ -211,7 +222,10 @@ mod tests {
             ([1.0, 1.0], [0.5, 0.5]),
         ] {
             let place = placement.apply(uv).unwrap();
-            assert!(place.distance(Vec2::from(expected)) < 1e-6, "{uv:?} {place}");
+            assert!(
+                place.distance(Vec2::from(expected)) < 1e-6,
+                "{uv:?} {place}"
+            );
         }
         assert!(placement.apply([f32::NAN, 0.0]).is_none());
     }

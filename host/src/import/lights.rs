@@ -92,7 +92,9 @@ impl Channels {
             return Ok(value);
         }
         let Rgb { r, g, b } = value;
-        Err(format!("`{key}` ({r}, {g}, {b}) must be numbers of zero or more"))
+        Err(format!(
+            "`{key}` ({r}, {g}, {b}) must be numbers of zero or more"
+        ))
     }
 }
 
@@ -106,22 +108,35 @@ pub(super) fn apply(
     repairs: &mut Repairs,
 ) -> Result<(), ImportError> {
     let text = read_text(path)?;
-    let entries = text.lines().filter(|line| line.trim_start().starts_with("[[light]]")).count();
+    let entries = text
+        .lines()
+        .filter(|line| line.trim_start().starts_with("[[light]]"))
+        .count();
     if entries > MOST_ENTRIES {
-        let fault = format!("{entries} lights; at most {MOST_ENTRIES} entries are handled, use fewer");
+        let fault =
+            format!("{entries} lights; at most {MOST_ENTRIES} entries are handled, use fewer");
         return Err(ImportError::file(path, fault));
     }
     let file: File = toml::from_str(&text).map_err(|error| syntax_error(path, &text, &error))?;
 
-    let scene: HashSet<String> = draft.entries.iter().map(|entry| entry.name.clone()).collect();
+    let scene: HashSet<String> = draft
+        .entries
+        .iter()
+        .map(|entry| entry.name.clone())
+        .collect();
     let mut replaced: HashMap<String, usize> = HashMap::new();
     for (value, number) in file.light.into_iter().zip(1..) {
-        let name = value.get("name").and_then(toml::Value::as_str).unwrap_or_default().to_owned();
+        let name = value
+            .get("name")
+            .and_then(toml::Value::as_str)
+            .unwrap_or_default()
+            .to_owned();
         let fault = |fault: String| {
             ImportError::part(path, format_args!("light {number} ({name:?})"), fault)
         };
-        let written: Written =
-            value.try_into().map_err(|error: toml::de::Error| fault(first_line(error.message())))?;
+        let written: Written = value
+            .try_into()
+            .map_err(|error: toml::de::Error| fault(first_line(error.message())))?;
         written.check().map_err(fault)?;
         if scene.contains(&written.name) {
             if let Some(earlier) = replaced.insert(written.name.clone(), number) {
@@ -130,7 +145,9 @@ pub(super) fn apply(
                 )));
             }
             repairs.ignored_light_geometry += usize::from(written.has_place());
-            draft.replacements.push(written.replacement().map_err(fault)?);
+            draft
+                .replacements
+                .push(written.replacement().map_err(fault)?);
         } else {
             written.add_to(draft, &scene).map_err(fault)?;
         }
@@ -158,13 +175,17 @@ impl Written {
         }
         let importance = self.importance.unwrap_or(1.0);
         if !(importance > 0.0 && importance.is_finite()) {
-            return Err(format!("`importance` {importance} must be a number above zero"));
+            return Err(format!(
+                "`importance` {importance} must be a number above zero"
+            ));
         }
         self.emission().map(drop)
     }
 
     fn emission(&self) -> Result<Option<Rgb>, String> {
-        self.emission.map(|emission| emission.legal("emission")).transpose()
+        self.emission
+            .map(|emission| emission.legal("emission"))
+            .transpose()
     }
 
     /// True when the entry says where a light is.
@@ -199,7 +220,10 @@ impl Written {
     /// Adds a new light; `scene` holds the names of those that it has.
     fn add_to(self, draft: &mut Draft, scene: &HashSet<String>) -> Result<(), String> {
         let kind = self.kind.ok_or_else(|| no_such_light(scene))?;
-        let stray = self.given().into_iter().find(|(_, given, kinds)| *given && !kinds.contains(&kind));
+        let stray = self
+            .given()
+            .into_iter()
+            .find(|(_, given, kinds)| *given && !kinds.contains(&kind));
         if let Some((key, ..)) = stray {
             return Err(format!("{} has no `{key}`; remove it", kind.with_article()));
         }
@@ -254,7 +278,10 @@ impl Written {
         let polygon = polygon.ok_or("an area light needs `polygon = [[x, y, z], ...]`")?;
         let vertices: Vec<Vec3> = polygon.iter().copied().map(Vec3::from).collect();
         Polygon::new(&vertices).map_err(|fault| format!("`polygon`: {fault}"))?;
-        let reflectance = self.reflectance.unwrap_or(Channels::Grey(0.0)).legal("reflectance")?;
+        let reflectance = self
+            .reflectance
+            .unwrap_or(Channels::Grey(0.0))
+            .legal("reflectance")?;
         let material = draft.add_material(Material {
             reflectance,
             texture: None,
@@ -289,7 +316,11 @@ impl Kind {
 fn no_such_light(scene: &HashSet<String>) -> String {
     let mut names: Vec<String> = scene.iter().map(|name| format!("{name:?}")).collect();
     names.sort_unstable();
-    let more = if names.len() > NAMES_SHOWN { ", ..." } else { "" };
+    let more = if names.len() > NAMES_SHOWN {
+        ", ..."
+    } else {
+        ""
+    };
     names.truncate(NAMES_SHOWN);
     format!(
         "the scene has no light of that name (it has: {}{more}); correct it, or add a light with \
@@ -352,7 +383,11 @@ mod tests {
         assert_eq!(panel.reflectance().get(), Rgb::splat(0.25));
         assert!(panel.is_two_sided());
         assert_eq!(scene.textures.len(), 3);
-        let tags: Vec<_> = scene.luminaires.iter().map(|l| (l.light(), *l.source())).collect();
+        let tags: Vec<_> = scene
+            .luminaires
+            .iter()
+            .map(|l| (l.light(), *l.source()))
+            .collect();
         assert_eq!(
             tags[0],
             (
@@ -374,7 +409,8 @@ mod tests {
 
     #[test]
     fn a_replaced_light_stays_where_it_is() {
-        let lights = "[[light]]\nname = 'lamp'\nkind = 'point'\nposition = [0,0,1]\nemission = [5,5,5]\n";
+        let lights =
+            "[[light]]\nname = 'lamp'\nkind = 'point'\nposition = [0,0,1]\nemission = [5,5,5]\n";
         let Imported { scene, repairs, .. } = import(lights).unwrap();
         assert_eq!((scene.lights.len(), scene.luminaires.len()), (1, 0));
         assert_eq!(scene.lights[0].emission, Rgb::splat(5.0));
@@ -388,41 +424,110 @@ mod tests {
         let first = "[[light]]\nname = 'sky'\nkind = 'sky'\nemission = 1\n[[light]]\n";
         let polygon = "polygon = [[0,0,0],[1,0,0],[0,1,0]]\n";
         let cases = [
-            ("name = 'x'\nkind = 'point'\nemission = 1", "light 2 (\"x\"): a point light needs `position = [x, y, z]`"),
-            ("name = 'x'\nkind = 'sun'\nemission = 1", "a sun needs `direction"),
-            ("name = 'x'\nkind = 'area'\nemission = 1", "an area light needs `polygon"),
-            ("name = 'x'\nkind = 'sky'", "needs an `emission = [r, g, b]`"),
-            ("name = 'x'\nkind = 'sky'\nemission = [1, -1, 1]", "`emission` (1, -1, 1) must be"),
-            ("name = 'x'\nkind = 'sky'\nemission = nan", "must be numbers"),
-            ("name = 'x'\nkind = 'sky'\nemission = [1, 2]", "expected a number or three numbers"),
-            ("name = 'x'\nkind = 'sky'\nemission = 1\nimportance = 0", "`importance` 0 must be"),
-            ("name = 'x'\nkind = 'sky'\nemission = 1\nimportance = inf", "`importance` inf"),
-            ("name = 'x'\nkind = 'sky'\nemission = 1\ncolour = 1", "light 2 (\"x\"): unknown field `colour`"),
-            ("name = 'x'\nkind = 'laser'\nemission = 1", "unknown variant `laser`"),
-            ("name = 'x'\nemission = 1", "the scene has no light of that name (it has: \"lamp\")"),
-            ("kind = 'sky'\nemission = 1", "light 2 (\"\"): missing field `name`"),
+            (
+                "name = 'x'\nkind = 'point'\nemission = 1",
+                "light 2 (\"x\"): a point light needs `position = [x, y, z]`",
+            ),
+            (
+                "name = 'x'\nkind = 'sun'\nemission = 1",
+                "a sun needs `direction",
+            ),
+            (
+                "name = 'x'\nkind = 'area'\nemission = 1",
+                "an area light needs `polygon",
+            ),
+            (
+                "name = 'x'\nkind = 'sky'",
+                "needs an `emission = [r, g, b]`",
+            ),
+            (
+                "name = 'x'\nkind = 'sky'\nemission = [1, -1, 1]",
+                "`emission` (1, -1, 1) must be",
+            ),
+            (
+                "name = 'x'\nkind = 'sky'\nemission = nan",
+                "must be numbers",
+            ),
+            (
+                "name = 'x'\nkind = 'sky'\nemission = [1, 2]",
+                "expected a number or three numbers",
+            ),
+            (
+                "name = 'x'\nkind = 'sky'\nemission = 1\nimportance = 0",
+                "`importance` 0 must be",
+            ),
+            (
+                "name = 'x'\nkind = 'sky'\nemission = 1\nimportance = inf",
+                "`importance` inf",
+            ),
+            (
+                "name = 'x'\nkind = 'sky'\nemission = 1\ncolour = 1",
+                "light 2 (\"x\"): unknown field `colour`",
+            ),
+            (
+                "name = 'x'\nkind = 'laser'\nemission = 1",
+                "unknown variant `laser`",
+            ),
+            (
+                "name = 'x'\nemission = 1",
+                "the scene has no light of that name (it has: \"lamp\")",
+            ),
+            (
+                "kind = 'sky'\nemission = 1",
+                "light 2 (\"\"): missing field `name`",
+            ),
             ("name = ''\nkind = 'sky'\nemission = 1", "the name is empty"),
-            ("name = 'x'\nkind = 'point'\nposition = [0,0,0]\nangle = 1\nemission = 1", "a point light has no `angle`; remove it"),
-            ("name = 'x'\nkind = 'spot'\nposition = [0,0,0]\ndirection = [0,0,0]\nemission = 1", "zero vector"),
-            ("name = 'x'\nkind = 'spot'\nposition = [0,0,0]\ndirection = [0,0,1]\ninner = 1\nouter = 0.5\nemission = 1", "0 <= inner <= outer <= pi"),
-            ("name = 'x'\nkind = 'area'\npolygon = [[0,0,0],[1,0,0]]\nemission = 1", "`polygon`: a polygon has three or four vertices"),
-            ("name = 'x'\nkind = 'area'\nreflectance = -1\nemission = 1\npolygon = [[0,0,0],[1,0,0],[0,1,0]]", "`reflectance` (-1, -1, -1)"),
+            (
+                "name = 'x'\nkind = 'point'\nposition = [0,0,0]\nangle = 1\nemission = 1",
+                "a point light has no `angle`; remove it",
+            ),
+            (
+                "name = 'x'\nkind = 'spot'\nposition = [0,0,0]\ndirection = [0,0,0]\nemission = 1",
+                "zero vector",
+            ),
+            (
+                "name = 'x'\nkind = 'spot'\nposition = [0,0,0]\ndirection = [0,0,1]\ninner = 1\nouter = 0.5\nemission = 1",
+                "0 <= inner <= outer <= pi",
+            ),
+            (
+                "name = 'x'\nkind = 'area'\npolygon = [[0,0,0],[1,0,0]]\nemission = 1",
+                "`polygon`: a polygon has three or four vertices",
+            ),
+            (
+                "name = 'x'\nkind = 'area'\nreflectance = -1\nemission = 1\npolygon = [[0,0,0],[1,0,0],[0,1,0]]",
+                "`reflectance` (-1, -1, -1)",
+            ),
         ];
         for (entry, expected) in cases {
-            let message = import(&format!("{first}{entry}\n")).unwrap_err().to_string();
-            assert!(message.contains("l.toml, light 2 (") && message.contains(expected), "{message}");
+            let message = import(&format!("{first}{entry}\n"))
+                .unwrap_err()
+                .to_string();
+            assert!(
+                message.contains("l.toml, light 2 (") && message.contains(expected),
+                "{message}"
+            );
             assert!(!message.contains('\n'), "{message}");
         }
-        let twice = "[[light]]\nname = 'lamp'\nemission = 1\n[[light]]\nname = 'lamp'\nemission = 2\n";
+        let twice =
+            "[[light]]\nname = 'lamp'\nemission = 1\n[[light]]\nname = 'lamp'\nemission = 2\n";
         let message = import(twice).unwrap_err().to_string();
-        assert!(message.contains("light 2 (\"lamp\"): light 1 replaces the same light"), "{message}");
+        assert!(
+            message.contains("light 2 (\"lamp\"): light 1 replaces the same light"),
+            "{message}"
+        );
         for (text, expected) in [
             ("[[light]]\nname = \n", "l.toml, line 2: "),
             ("[[lights]]\nname = 'x'\n", "unknown field `lights`"),
-            ("[[light]]\nname = 'x'\nname = 'y'\n", "line 3: duplicate key"),
+            (
+                "[[light]]\nname = 'x'\nname = 'y'\n",
+                "line 3: duplicate key",
+            ),
         ] {
             let message = import(text).unwrap_err().to_string();
-            assert!(message.contains(expected) && !message.contains('\n'), "{message}");
+            assert!(
+                message.contains(expected) && !message.contains('\n'),
+                "{message}"
+            );
         }
         let dark = format!("[[light]]\nname = 'x'\nkind = 'area'\nemission = 0\n{polygon}");
         assert!(import(&dark).is_ok());
@@ -430,7 +535,9 @@ mod tests {
 
     #[test]
     fn a_million_lights_are_refused_at_once() {
-        let message = import(&"[[light]]\n".repeat(1_000_000)).unwrap_err().to_string();
+        let message = import(&"[[light]]\n".repeat(1_000_000))
+            .unwrap_err()
+            .to_string();
         assert!(message.ends_with("1000000 lights; at most 262144 entries are handled, use fewer"));
     }
 

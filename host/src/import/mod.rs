@@ -14,6 +14,8 @@ mod draft;
 mod error;
 mod gltf;
 mod gltf_data;
+mod gltf_file;
+mod gltf_lights;
 mod gltf_materials;
 mod lights;
 mod obj;

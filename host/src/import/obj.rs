@@ -33,18 +33,26 @@ pub(super) fn read(path: &Path, repairs: &mut Repairs) -> Result<Draft, ImportEr
     repairs.degenerate_faces += plain.too_small;
 
     let library = Library::load(path, &plain.libraries, repairs)?;
-    let (models, materials) =
-        tobj::load_obj_buf(&mut plain.text.as_bytes(), &PARSER, |name| library.parsed(name))
-            .map_err(|error| ImportError::file(path, error))?;
+    let (models, materials) = tobj::load_obj_buf(&mut plain.text.as_bytes(), &PARSER, |name| {
+        library.parsed(name)
+    })
+    .map_err(|error| ImportError::file(path, error))?;
     let materials = materials.unwrap_or_default();
 
     let mut draft = Draft::default();
     let mut numbers: HashMap<Option<&str>, usize> = HashMap::new();
     for tobj::Model { mesh, .. } in &models {
-        let name = mesh.material_id.and_then(|id| materials.get(id)).map(|m| m.name.as_str());
+        let name = mesh
+            .material_id
+            .and_then(|id| materials.get(id))
+            .map(|m| m.name.as_str());
         let described = name.and_then(|name| library.get(name));
         let number = *numbers.entry(name).or_insert_with(|| {
-            draft.add_material(described.cloned().unwrap_or_else(|| Material::unknown(true)))
+            draft.add_material(
+                described
+                    .cloned()
+                    .unwrap_or_else(|| Material::unknown(true)),
+            )
         });
         let is_textured = described.is_some_and(|material| material.texture.is_some());
         let before = draft.outlines.len();
@@ -65,18 +73,29 @@ fn add_faces(
     draft: &mut Draft,
 ) -> Result<(), ImportError> {
     let triangles = vec![3; mesh.indices.len() / 3];
-    let arities = if mesh.face_arities.is_empty() { &triangles } else { &mesh.face_arities };
+    let arities = if mesh.face_arities.is_empty() {
+        &triangles
+    } else {
+        &mesh.face_arities
+    };
     let mut first = 0;
     for arity in arities {
         let end = first + *arity as usize;
         let corners = first..end;
         first = end;
         let vertices = mesh.indices.get(corners.clone()).unwrap_or_default();
-        let places = mesh.texcoord_indices.get(corners).filter(|_| is_textured).unwrap_or_default();
+        let places = mesh
+            .texcoord_indices
+            .get(corners)
+            .filter(|_| is_textured)
+            .unwrap_or_default();
         let uv: Option<Vec<Vec2>> = places.iter().map(|i| place(&mesh.texcoords, *i)).collect();
         let outline = Outline {
             material,
-            vertices: vertices.iter().filter_map(|i| vertex(&mesh.positions, *i)).collect(),
+            vertices: vertices
+                .iter()
+                .filter_map(|i| vertex(&mesh.positions, *i))
+                .collect(),
             uv: uv.unwrap_or_default(),
         };
         draft.add_outline(path, outline)?;
@@ -103,7 +122,8 @@ mod tests {
     use crate::import::{Imported, load};
     use relume::color::Rgb;
 
-    const BOX: &str = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+    const BOX: &str =
+        "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
 
     fn import(obj: &str, mtl: Option<&str>) -> Result<Imported, ImportError> {
         let folder = tempfile::tempdir().unwrap();
@@ -124,17 +144,32 @@ mod tests {
             "{BOX}v 0 0 5\nv 1 0 5\nv 1 1 5\nusemtl lamp\nf 4 3 2 1\nusemtl wall\nf 5 6 7\nusemtl lamp\nf 5 7 6\n"
         );
         let mtl = "newmtl wall\nKd 0.5 1.5 0.25\nnewmtl lamp\nKd 0 0 0\nKe 2 1 0\n";
-        let Imported { scene, polygons, repairs } = import(&obj, Some(mtl)).unwrap();
+        let Imported {
+            scene,
+            polygons,
+            repairs,
+        } = import(&obj, Some(mtl)).unwrap();
         assert_eq!(polygons, 3);
         let quad = scene.surfaces[0].polygon().vertices();
-        assert_eq!(quad, [Vec3::Y, Vec3::new(1.0, 1.0, 0.0), Vec3::X, Vec3::ZERO]);
+        assert_eq!(
+            quad,
+            [Vec3::Y, Vec3::new(1.0, 1.0, 0.0), Vec3::X, Vec3::ZERO]
+        );
         assert_eq!(scene.surfaces[0].emission().unwrap().share, Rgb::WHITE);
         assert_eq!(scene.lights.len(), 1);
         assert_eq!(scene.lights[0].name, "lamp");
-        assert_eq!(scene.lights[0].emission, Rgb::new(2.0, 1.0, 0.0) * std::f32::consts::PI);
+        assert_eq!(
+            scene.lights[0].emission,
+            Rgb::new(2.0, 1.0, 0.0) * std::f32::consts::PI
+        );
         // The last face is the wall's place from behind: of the two, the lamp stays.
         assert_eq!((scene.surfaces.len(), repairs.duplicate_faces), (2, 1));
-        assert!(scene.surfaces.iter().all(|s| s.is_two_sided() && s.emission().is_some()));
+        assert!(
+            scene
+                .surfaces
+                .iter()
+                .all(|s| s.is_two_sided() && s.emission().is_some())
+        );
     }
 
     #[test]
@@ -155,7 +190,10 @@ mod tests {
         let obj = format!("{BOX}usemtl t\nf 1/1 2/2 3/3 4/4\n");
         let mtl = "newmtl t\nmap_Kd -clamp on top white.png\n";
         let Imported { scene, repairs, .. } = import(&obj, Some(mtl)).unwrap();
-        assert_eq!((repairs.textures_used, repairs.ignored_texture_options), (1, 1));
+        assert_eq!(
+            (repairs.textures_used, repairs.ignored_texture_options),
+            (1, 1)
+        );
         let texture = scene.textures[0].as_ref().unwrap();
         let lower = texture.mean_over(Vec2::ZERO, Vec2::new(1.0, 0.5)).r;
         let upper = texture.mean_over(Vec2::new(0.0, 0.5), Vec2::ONE).r;
@@ -172,12 +210,28 @@ mod tests {
     #[test]
     fn errors_name_file_and_place() {
         let cases = [
-            (format!("{BOX}f 1 2 9\n"), "m", "s.OBJ, line 10: \"9\" is no vertex"),
-            (format!("{BOX}v 1 NaN 2\n"), "m", "s.OBJ, line 10: vertex (1, NaN, 2) is not finite"),
+            (
+                format!("{BOX}f 1 2 9\n"),
+                "m",
+                "s.OBJ, line 10: \"9\" is no vertex",
+            ),
+            (
+                format!("{BOX}v 1 NaN 2\n"),
+                "m",
+                "s.OBJ, line 10: vertex (1, NaN, 2) is not finite",
+            ),
             (BOX.to_owned(), "", "s.OBJ: no usable face"),
             (String::new(), "", "s.OBJ: no usable face"),
-            (format!("{BOX}usemtl a\nf 1 2 3"), "newmtl a\nKd -1 0 0", "m.mtl, material \"a\": Kd (-1, 0, 0)"),
-            (format!("{BOX}usemtl a\nf 1 2 3"), "newmtl a\nKd 1 0", "m.mtl, line 2: `Kd` needs"),
+            (
+                format!("{BOX}usemtl a\nf 1 2 3"),
+                "newmtl a\nKd -1 0 0",
+                "m.mtl, material \"a\": Kd (-1, 0, 0)",
+            ),
+            (
+                format!("{BOX}usemtl a\nf 1 2 3"),
+                "newmtl a\nKd 1 0",
+                "m.mtl, line 2: `Kd` needs",
+            ),
         ];
         for (obj, mtl, expected) in cases {
             let message = import(&obj, Some(mtl)).unwrap_err().to_string();
@@ -189,7 +243,17 @@ mod tests {
         std::fs::write(&scene, b"# ok\n# caf\xe9\nv 0 0 0\n").unwrap();
         let message = load(&scene, None).unwrap_err().to_string();
         assert!(message.ends_with("latin.obj, line 2: not UTF-8 text; save the file as UTF-8"));
-        assert!(load(&folder.path().join("no.obj"), None).unwrap_err().to_string().contains("cannot be read"));
-        assert!(load(Path::new("scene.fbx"), None).unwrap_err().to_string().contains("not a known kind"));
+        assert!(
+            load(&folder.path().join("no.obj"), None)
+                .unwrap_err()
+                .to_string()
+                .contains("cannot be read")
+        );
+        assert!(
+            load(Path::new("scene.fbx"), None)
+                .unwrap_err()
+                .to_string()
+                .contains("not a known kind")
+        );
     }
 }

@@ -45,7 +45,9 @@ impl Library {
             let paths = if whole.is_file() {
                 vec![whole]
             } else {
-                name.split_whitespace().map(|name| folder.join(portable(name))).collect()
+                name.split_whitespace()
+                    .map(|name| folder.join(portable(name)))
+                    .collect()
             };
             let mut parsed = Vec::new();
             for path in paths {
@@ -62,8 +64,16 @@ impl Library {
 
     /// What the OBJ parser's loader returns for a name.
     pub fn parsed(&self, name: &Path) -> tobj::MTLLoadResult {
-        let materials = self.parsed.get(name).cloned().ok_or(tobj::LoadError::OpenFileFailed)?;
-        let numbers = materials.iter().map(|material| material.name.clone()).zip(0..).collect();
+        let materials = self
+            .parsed
+            .get(name)
+            .cloned()
+            .ok_or(tobj::LoadError::OpenFileFailed)?;
+        let numbers = materials
+            .iter()
+            .map(|material| material.name.clone())
+            .zip(0..)
+            .collect();
         Ok((materials, numbers))
     }
 
@@ -96,11 +106,17 @@ impl Library {
         material: &tobj::Material,
         repairs: &mut Repairs,
     ) -> Result<Material, String> {
-        let reflectance =
-            material.diffuse.map(|diffuse| legal_reflectance("Kd", diffuse)).transpose()?;
+        let reflectance = material
+            .diffuse
+            .map(|diffuse| legal_reflectance("Kd", diffuse))
+            .transpose()?;
         let texture = material.diffuse_texture.as_deref();
         let texture = texture.and_then(|statement| self.image(path, statement, repairs));
-        let plain = if texture.is_some() { 1.0 } else { DEFAULT_REFLECTANCE };
+        let plain = if texture.is_some() {
+            1.0
+        } else {
+            DEFAULT_REFLECTANCE
+        };
         let radiance = material.emissive.unwrap_or_default();
         Ok(Material {
             reflectance: reflectance.unwrap_or(Rgb::splat(plain)),
@@ -124,7 +140,10 @@ impl Library {
         if name != statement {
             repairs.ignored_texture_options += 1;
         }
-        let path = library.parent().unwrap_or(Path::new("")).join(portable(name));
+        let path = library
+            .parent()
+            .unwrap_or(Path::new(""))
+            .join(portable(name));
         let image = self.images.entry(path).or_insert_with_key(|path| {
             let bytes = std::fs::read(path).ok()?;
             Image::decode(&bytes).ok().map(Arc::new)
@@ -197,7 +216,11 @@ mod tests {
         for bad in [-0.1, f32::NAN, f32::INFINITY] {
             let fault = describe(Some([0.5, bad, 0.5]), None).unwrap_err();
             assert!(fault.starts_with("Kd (0.5, "), "{fault}");
-            assert!(describe(None, Some([bad; 3])).unwrap_err().starts_with("Ke"));
+            assert!(
+                describe(None, Some([bad; 3]))
+                    .unwrap_err()
+                    .starts_with("Ke")
+            );
         }
     }
 }

@@ -43,14 +43,17 @@ fn statements(text: &str) -> impl Iterator<Item = (usize, String)> + '_ {
 /// The keyword of a statement and the rest of it; a comment has `#` for its keyword.
 fn split(statement: &str) -> (&str, &str) {
     let statement = statement.trim();
-    let end = statement.find(char::is_whitespace).unwrap_or(statement.len());
+    let end = statement
+        .find(char::is_whitespace)
+        .unwrap_or(statement.len());
     let (keyword, rest) = statement.split_at(end);
     (keyword, rest.trim())
 }
 
 /// The words of a statement without names, in which a `#` can only begin a comment.
 fn words(rest: &str) -> impl Iterator<Item = &str> {
-    rest.split_whitespace().take_while(|word| !word.starts_with('#'))
+    rest.split_whitespace()
+        .take_while(|word| !word.starts_with('#'))
 }
 
 /// Brings an OBJ file into plain form.
@@ -126,7 +129,9 @@ fn plain_numbers([x, y, z]: [f32; 3]) -> Result<String, String> {
     if [x, y, z].iter().all(|number| number.is_finite()) {
         return Ok(format!("{x} {y} {z}"));
     }
-    Err(format!("vertex ({x}, {y}, {z}) is not finite; correct or remove it"))
+    Err(format!(
+        "vertex ({x}, {y}, {z}) is not finite; correct or remove it"
+    ))
 }
 
 /// `u v`; a texture of one dimension has only `u`.
@@ -140,15 +145,17 @@ fn texture_place(rest: &str) -> Result<String, String> {
 
 fn numbers(rest: &str, keyword: &str) -> Result<Vec<f32>, String> {
     let number = |word: &str| {
-        word.parse().map_err(|_| format!("{word:?} after `{keyword}` is not a number; correct it"))
+        word.parse()
+            .map_err(|_| format!("{word:?} after `{keyword}` is not a number; correct it"))
     };
     words(rest).map(number).collect()
 }
 
 /// The corners as `v/vt`, in the numbering of the plain text; `None` for fewer than three.
 fn face(rest: &str, defined: Defined) -> Result<Option<String>, String> {
-    let corners: Vec<String> =
-        words(rest).map(|word| corner(word, defined)).collect::<Result<_, _>>()?;
+    let corners: Vec<String> = words(rest)
+        .map(|word| corner(word, defined))
+        .collect::<Result<_, _>>()?;
     if corners.len() > MOST_CORNERS {
         return Err(format!(
             "a face of {} corners; at most {MOST_CORNERS} are handled, triangulate it",
@@ -171,13 +178,18 @@ fn corner(word: &str, defined: Defined) -> Result<String, String> {
 
 /// An index counted from 1; negative ones count back from the last one defined.
 fn index(word: &str, defined: usize, what: &str) -> Result<usize, String> {
-    let fault = || format!("{word:?} is no {what} of the {defined} above this line; correct the face");
+    let fault =
+        || format!("{word:?} is no {what} of the {defined} above this line; correct the face");
     let index: i64 = word.parse().map_err(|_| fault())?;
     let distance = usize::try_from(index.unsigned_abs()).map_err(|_| fault())?;
     if distance == 0 || distance > defined {
         return Err(fault());
     }
-    Ok(if index > 0 { distance } else { defined - distance + 1 })
+    Ok(if index > 0 {
+        distance
+    } else {
+        defined - distance + 1
+    })
 }
 
 /// Brings an MTL file into plain form.
@@ -241,7 +253,10 @@ mod tests {
             ("f 1 2 -4", "\"-4\" is no vertex"),
             ("f 1 2 -9223372036854775808", "is no vertex"),
             ("f 1 2 99999999999999999999", "is no vertex"),
-            ("f 1/2 2/1 3/1", "\"2\" is no texture coordinate of the 1 above"),
+            (
+                "f 1/2 2/1 3/1",
+                "\"2\" is no texture coordinate of the 1 above",
+            ),
             ("f a b c", "\"a\" is no vertex"),
             ("v 1 2", "needs three numbers"),
             ("v 1 nan 2", "not finite"),
@@ -263,7 +278,10 @@ mod tests {
     #[test]
     fn an_mtl_becomes_plain() {
         let plain = plain_mtl("newmtl a b\n\tKd 0.5\nKe 1 2 3\nd x\nmap_Kd -s 1 1 1 t.png\nKs 1\n");
-        assert_eq!(plain.unwrap(), "newmtl a b\nKd 0.5 0.5 0.5\nKe 1 2 3\nmap_Kd -s 1 1 1 t.png\n");
+        assert_eq!(
+            plain.unwrap(),
+            "newmtl a b\nKd 0.5 0.5 0.5\nKe 1 2 3\nmap_Kd -s 1 1 1 t.png\n"
+        );
         assert_eq!(plain_mtl("\nKd 1 2").unwrap_err().0, 2);
         assert_eq!(plain_mtl("Kd spectral f.rfl").unwrap_err().0, 1);
         assert_eq!(plain_mtl("newmtl").unwrap_err().0, 1);

@@ -146,7 +146,8 @@ fn joined_outline(a: &Outline, b: &Outline) -> Option<Outline> {
         if a_keys.get(from) != b_keys.get(back_to) || a_keys.get(to) != b_keys.get(back_from) {
             continue;
         }
-        let same_image_place = a.uv.get(from) == b.uv.get(back_to) && a.uv.get(to) == b.uv.get(back_from);
+        let same_image_place =
+            a.uv.get(from) == b.uv.get(back_to) && a.uv.get(to) == b.uv.get(back_from);
         if !same_image_place {
             return None;
         }
@@ -167,10 +168,15 @@ fn smallest_sine(vertices: &[Vec3]) -> f32 {
     };
     let normal = (c - a).cross(d - b).normalize_or_zero();
     let sine = |before: Vec3, at: Vec3, after: Vec3| {
-        let (arriving, leaving) = ((at - before).normalize_or_zero(), (after - at).normalize_or_zero());
+        let (arriving, leaving) = (
+            (at - before).normalize_or_zero(),
+            (after - at).normalize_or_zero(),
+        );
         arriving.cross(leaving).dot(normal)
     };
-    [sine(d, a, b), sine(a, b, c), sine(b, c, d), sine(c, d, a)].into_iter().fold(1.0, f32::min)
+    [sine(d, a, b), sine(a, b, c), sine(b, c, d), sine(c, d, a)]
+        .into_iter()
+        .fold(1.0, f32::min)
 }
 
 /// Whether one affine map takes all four corners to their places in the image.
@@ -185,7 +191,10 @@ fn is_affine(quad: &Outline) -> bool {
     let t = along_s.cross(to_c).dot(normal) / normal.length_squared();
     let expected = *uv_a + (*uv_b - *uv_a) * s + (*uv_d - *uv_a) * t;
     let edges = [(uv_a, uv_b), (uv_b, uv_c), (uv_c, uv_d), (uv_d, uv_a)];
-    let longest = edges.iter().map(|(p, q): &(&Vec2, &Vec2)| p.distance(**q)).fold(0.0, f32::max);
+    let longest = edges
+        .iter()
+        .map(|(p, q): &(&Vec2, &Vec2)| p.distance(**q))
+        .fold(0.0, f32::max);
     expected.distance(*uv_c) <= AFFINE * longest
 }
 
@@ -205,9 +214,15 @@ mod tests {
         let mut repairs = Repairs::default();
         let pieces = outlines
             .into_iter()
-            .map(|outline| Piece { polygon: Polygon::new(&outline.vertices).unwrap(), outline })
+            .map(|outline| Piece {
+                polygon: Polygon::new(&outline.vertices).unwrap(),
+                outline,
+            })
             .collect();
-        let outlines = recover_quads(pieces, &mut repairs).into_iter().map(|p| p.outline).collect();
+        let outlines = recover_quads(pieces, &mut repairs)
+            .into_iter()
+            .map(|p| p.outline)
+            .collect();
         (outlines, repairs.recovered_quads)
     }
 
@@ -219,7 +234,11 @@ mod tests {
     #[test]
     fn halves_become_the_quad_that_they_were() {
         let expected: Vec<Vec3> = [A, B, C, D].into_iter().map(Vec3::from).collect();
-        for (first, second) in [([A, B, C], [A, C, D]), ([A, B, D], [B, C, D]), ([A, C, D], [A, B, C])] {
+        for (first, second) in [
+            ([A, B, C], [A, C, D]),
+            ([A, B, D], [B, C, D]),
+            ([A, C, D], [A, B, C]),
+        ] {
             let (quads, count) = recover(vec![triangle(first), triangle(second)]);
             assert_eq!(count, 1);
             assert_eq!(quads[0].vertices, expected, "{first:?} {second:?}");
@@ -232,9 +251,9 @@ mod tests {
         let sharp = [4.0, 0.01, 0.0];
         let inside = [1.5, 0.1, 0.0];
         let cases = [
-            ([A, B, D], [B, folded, D]),   // warped
-            ([A, B, D], [B, D, C]),        // the other one looks away
-            ([A, B, D], [B, sharp, D]),    // a corner that hardly turns
+            ([A, B, D], [B, folded, D]),                // warped
+            ([A, B, D], [B, D, C]),                     // the other one looks away
+            ([A, B, D], [B, sharp, D]),                 // a corner that hardly turns
             ([A, B, D], [A, [0.0, -1.0, 0.0], inside]), // no common edge
         ];
         for (first, second) in cases {
@@ -280,7 +299,11 @@ mod tests {
         assert_eq!(count, 1);
         assert_eq!(quads[0].uv, [a, b, c, d].map(Vec2::from));
         for wrong in [[a, c, [0.0, 0.3]], [[0.1, 0.0], c, d]] {
-            assert_eq!(recover(vec![first.clone(), with([A, C, D], wrong)]).1, 0, "{wrong:?}");
+            assert_eq!(
+                recover(vec![first.clone(), with([A, C, D], wrong)]).1,
+                0,
+                "{wrong:?}"
+            );
         }
         assert_eq!(recover(vec![first, triangle([A, C, D])]).1, 0);
     }

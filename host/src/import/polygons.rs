@@ -66,11 +66,7 @@ pub(super) fn legalize(
 }
 
 /// Adds the outline as it is, or its triangles.
-fn cut(
-    mut outline: Outline,
-    pieces: &mut Vec<Piece>,
-    repairs: &mut Repairs,
-) -> Result<(), String> {
+fn cut(mut outline: Outline, pieces: &mut Vec<Piece>, repairs: &mut Repairs) -> Result<(), String> {
     if drop_repeated_vertices(&mut outline) {
         repairs.repeated_vertices += 1;
     }
@@ -90,8 +86,16 @@ fn cut(
 
     let first = pieces.len();
     let triangles = ears(&outline.vertices);
-    pieces.extend(triangles.iter().filter_map(|triangle| corner_piece(&outline, *triangle)));
-    let area: f64 = pieces.iter().skip(first).map(|piece| f64::from(piece.polygon.area())).sum();
+    pieces.extend(
+        triangles
+            .iter()
+            .filter_map(|triangle| corner_piece(&outline, *triangle)),
+    );
+    let area: f64 = pieces
+        .iter()
+        .skip(first)
+        .map(|piece| f64::from(piece.polygon.area()))
+        .sum();
     if area == 0.0 {
         repairs.degenerate_faces += 1;
         return Ok(());
@@ -110,33 +114,41 @@ fn cut(
 
 /// True when there were any.
 fn drop_repeated_vertices(outline: &mut Outline) -> bool {
-    let Some(last) = outline.vertices.last().copied() else {
-        return false;
-    };
-    let before = outline.vertices.iter().take(outline.vertices.len() - 1);
-    let previous: Vec<Vec3> = std::iter::once(&last).chain(before).copied().collect();
-    let keep: Vec<bool> =
-        outline.vertices.iter().zip(previous).map(|(vertex, previous)| *vertex != previous).collect();
-    if keep.iter().all(|keep| *keep) {
+    let vertices = &outline.vertices;
+    let previous = vertices
+        .iter()
+        .cycle()
+        .skip(vertices.len().saturating_sub(1));
+    let is_new = vertices
+        .iter()
+        .zip(previous)
+        .map(|(vertex, previous)| vertex != previous);
+    if is_new.clone().all(|is_new| is_new) {
         return false;
     }
-    let mut kept = keep.iter();
-    outline.vertices.retain(|_| kept.next().copied().unwrap_or(true));
-    let mut kept = keep.iter();
-    outline.uv.retain(|_| kept.next().copied().unwrap_or(true));
+    let keep: Vec<bool> = is_new.collect();
+    let mut kept = keep.iter().copied();
+    outline.vertices.retain(|_| kept.next().unwrap_or(true));
+    let mut kept = keep.iter().copied();
+    outline.uv.retain(|_| kept.next().unwrap_or(true));
     true
 }
 
 /// A triangle of the outline's vertices; `None` when it has no area.
 fn corner_piece(outline: &Outline, triangle: [usize; 3]) -> Option<Piece> {
-    let vertices: Vec<Vec3> =
-        triangle.iter().filter_map(|i| outline.vertices.get(*i).copied()).collect();
+    let vertices: Vec<Vec3> = triangle
+        .iter()
+        .filter_map(|i| outline.vertices.get(*i).copied())
+        .collect();
     Some(Piece {
         polygon: Polygon::new(&vertices).ok()?,
         outline: Outline {
             material: outline.material,
             vertices,
-            uv: triangle.iter().filter_map(|i| outline.uv.get(*i).copied()).collect(),
+            uv: triangle
+                .iter()
+                .filter_map(|i| outline.uv.get(*i).copied())
+                .collect(),
         },
     })
 }
@@ -151,7 +163,8 @@ fn newell(points: &[DVec3]) -> DVec3 {
         return DVec3::ZERO;
     };
     let fan = rest.iter().zip(rest.iter().skip(1));
-    fan.map(|(b, c)| (*b - *origin).cross(*c - *origin) * 0.5).sum()
+    fan.map(|(b, c)| (*b - *origin).cross(*c - *origin) * 0.5)
+        .sum()
 }
 
 /// Cuts a polygon into triangles of its vertices' numbers, wound as the polygon is.
@@ -163,7 +176,11 @@ fn ears(vertices: &[Vec3]) -> Vec<[usize; 3]> {
     let normal = newell(&points);
     let mut ring: Vec<usize> = (0..points.len()).collect();
     let quality = |ring: &[usize], tip: usize| ear_quality(&points, normal, ring, tip);
-    let all = |ring: &[usize]| (0..ring.len()).map(|tip| quality(ring, tip)).collect::<Vec<f64>>();
+    let all = |ring: &[usize]| {
+        (0..ring.len())
+            .map(|tip| quality(ring, tip))
+            .collect::<Vec<f64>>()
+    };
 
     let mut triangles = Vec::new();
     let mut qualities = all(&ring);
@@ -208,7 +225,8 @@ fn corner(ring: &[usize], tip: usize) -> Option<[usize; 3]> {
 /// Twice the area of the ear at `tip` over the square of its longest edge; 0 where no ear is.
 fn ear_quality(points: &[DVec3], normal: DVec3, ring: &[usize], tip: usize) -> f64 {
     let point = |i: usize| points.get(i).copied();
-    let Some([Some(a), Some(b), Some(c)]) = corner(ring, tip).map(|corner| corner.map(point)) else {
+    let Some([Some(a), Some(b), Some(c)]) = corner(ring, tip).map(|corner| corner.map(point))
+    else {
         return 0.0;
     };
     let side = |from: DVec3, to: DVec3, p: DVec3| (to - from).cross(p - from).dot(normal);
@@ -224,7 +242,10 @@ fn ear_quality(points: &[DVec3], normal: DVec3, ring: &[usize], tip: usize) -> f
     if turn <= 0.0 || is_blocked() {
         return 0.0;
     }
-    let longest = [b - a, c - b, a - c].map(DVec3::length_squared).into_iter().fold(0.0, f64::max);
+    let longest = [b - a, c - b, a - c]
+        .map(DVec3::length_squared)
+        .into_iter()
+        .fold(0.0, f64::max);
     turn / (normal.length() * longest)
 }
 
@@ -235,15 +256,23 @@ fn drop_duplicates(pieces: &mut Vec<Piece>, materials: &[Material], repairs: &mu
     for (index, piece) in pieces.iter().enumerate() {
         let here = places.entry(place(&piece.polygon)).or_default();
         let same = here.iter_mut().find(|other| {
-            pieces.get(**other).is_some_and(|other| is_duplicate(piece, other, materials))
+            pieces
+                .get(**other)
+                .is_some_and(|other| is_duplicate(piece, other, materials))
         });
         let Some(other) = same else {
             here.push(index);
             continue;
         };
         let later_stays = emits(piece, materials)
-            && !pieces.get(*other).is_some_and(|other| emits(other, materials));
-        let dropped = if later_stays { std::mem::replace(other, index) } else { index };
+            && !pieces
+                .get(*other)
+                .is_some_and(|other| emits(other, materials));
+        let dropped = if later_stays {
+            std::mem::replace(other, index)
+        } else {
+            index
+        };
         if let Some(kept) = kept.get_mut(dropped) {
             *kept = false;
         }
@@ -266,7 +295,9 @@ fn place(polygon: &Polygon) -> [Key; MAX_VERTICES] {
 /// Whether two faces with the same vertices are one too many.
 fn is_duplicate(a: &Piece, b: &Piece, materials: &[Material]) -> bool {
     let two_sided = |piece: &Piece| {
-        materials.get(piece.outline.material).is_some_and(|material| material.two_sided)
+        materials
+            .get(piece.outline.material)
+            .is_some_and(|material| material.two_sided)
     };
     let same_side = a.polygon.normal().dot(b.polygon.normal()) > 0.0;
     let back_to_back_lamps = emits(a, materials) && emits(b, materials);
@@ -274,7 +305,9 @@ fn is_duplicate(a: &Piece, b: &Piece, materials: &[Material]) -> bool {
 }
 
 fn emits(piece: &Piece, materials: &[Material]) -> bool {
-    materials.get(piece.outline.material).is_some_and(|material| material.glow.is_some())
+    materials
+        .get(piece.outline.material)
+        .is_some_and(|material| material.glow.is_some())
 }
 
 #[cfg(test)]
@@ -293,7 +326,12 @@ mod tests {
     }
 
     fn flat(points: &[[f32; 2]]) -> Outline {
-        outline(&points.iter().map(|[x, y]| [*x, *y, 0.0]).collect::<Vec<_>>())
+        outline(
+            &points
+                .iter()
+                .map(|[x, y]| [*x, *y, 0.0])
+                .collect::<Vec<_>>(),
+        )
     }
 
     fn legal(outlines: Vec<Outline>) -> (Vec<Outline>, Repairs) {
@@ -304,7 +342,10 @@ mod tests {
     }
 
     fn area(outlines: &[Outline]) -> f32 {
-        outlines.iter().map(|o| Polygon::new(&o.vertices).unwrap().area()).sum()
+        outlines
+            .iter()
+            .map(|o| Polygon::new(&o.vertices).unwrap().area())
+            .sum()
     }
 
     const SQUARE: [[f32; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
@@ -320,16 +361,37 @@ mod tests {
 
     #[test]
     fn concave_warped_and_large_polygons_become_triangles_of_the_same_area() {
-        let (dart, repairs) = legal(vec![flat(&[[0.0, 0.0], [4.0, 0.0], [1.0, 1.0], [0.0, 4.0]])]);
+        let (dart, repairs) = legal(vec![flat(&[
+            [0.0, 0.0],
+            [4.0, 0.0],
+            [1.0, 1.0],
+            [0.0, 4.0],
+        ])]);
         assert_eq!((dart.len(), repairs.concave_quads), (2, 1));
         assert!((area(&dart) - 4.0).abs() < 1e-5);
 
-        let warped = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.5], [0.0, 1.0, 0.0]];
+        let warped = [
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [1.0, 1.0, 0.5],
+            [0.0, 1.0, 0.0],
+        ];
         let (halves, repairs) = legal(vec![outline(&warped)]);
-        assert_eq!((halves.len(), repairs.warped_quads, repairs.crossed_outlines), (2, 1, 0));
+        assert_eq!(
+            (halves.len(), repairs.warped_quads, repairs.crossed_outlines),
+            (2, 1, 0)
+        );
 
         // An L of area 3, with a vertex in the middle of an edge.
-        let ell = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
+        let ell = [
+            [0.0, 0.0],
+            [1.0, 0.0],
+            [2.0, 0.0],
+            [2.0, 1.0],
+            [1.0, 1.0],
+            [1.0, 2.0],
+            [0.0, 2.0],
+        ];
         let (parts, repairs) = legal(vec![flat(&ell)]);
         assert!((area(&parts) - 3.0).abs() < 1e-5, "{parts:?}");
         assert_eq!((repairs.large_polygons, repairs.crossed_outlines), (1, 0));
@@ -341,8 +403,16 @@ mod tests {
     #[test]
     fn a_hole_behind_a_double_edge_stays_open() {
         let window = [
-            [0.0, 0.0], [3.0, 0.0], [3.0, 3.0], [0.0, 3.0], [0.0, 0.0],
-            [1.0, 1.0], [1.0, 2.0], [2.0, 2.0], [2.0, 1.0], [1.0, 1.0],
+            [0.0, 0.0],
+            [3.0, 0.0],
+            [3.0, 3.0],
+            [0.0, 3.0],
+            [0.0, 0.0],
+            [1.0, 1.0],
+            [1.0, 2.0],
+            [2.0, 2.0],
+            [2.0, 1.0],
+            [1.0, 1.0],
         ];
         let (parts, repairs) = legal(vec![flat(&window)]);
         assert!((area(&parts) - 8.0).abs() < 1e-5, "{parts:?}");
@@ -350,15 +420,24 @@ mod tests {
         let centre = Vec3::new(1.5, 1.5, 0.0);
         for part in &parts {
             let polygon = Polygon::new(&part.vertices).unwrap();
-            assert!(polygon.crossing(centre + Vec3::Z, centre - Vec3::Z).is_none(), "{part:?}");
+            assert!(
+                polygon
+                    .crossing(centre + Vec3::Z, centre - Vec3::Z)
+                    .is_none(),
+                "{part:?}"
+            );
         }
     }
 
     #[test]
     fn crossed_outlines_are_counted_and_do_not_hang() {
-        let star: Vec<[f32; 2]> =
-            (0..5).map(|i| (i as f32 * 0.8 * std::f32::consts::PI).sin_cos().into()).collect();
-        let (_, repairs) = legal(vec![flat(&star), flat(&[[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]])]);
+        let star: Vec<[f32; 2]> = (0..5)
+            .map(|i| (i as f32 * 0.8 * std::f32::consts::PI).sin_cos().into())
+            .collect();
+        let (_, repairs) = legal(vec![
+            flat(&star),
+            flat(&[[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]]),
+        ]);
         assert_eq!((repairs.crossed_outlines, repairs.degenerate_faces), (1, 1));
     }
 
@@ -370,15 +449,25 @@ mod tests {
         let point = flat(&[[1.0, 1.0]; 6]);
         let (parts, repairs) = legal(vec![repeated, line, point, flat(&[]), flat(&SQUARE[..2])]);
         assert_eq!(parts.len(), 1);
-        assert_eq!(parts[0].vertices, flat(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]).vertices);
+        assert_eq!(
+            parts[0].vertices,
+            flat(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]).vertices
+        );
         assert_eq!(parts[0].uv, [Vec2::ZERO, Vec2::X, Vec2::Y]);
-        assert_eq!((repairs.repeated_vertices, repairs.degenerate_faces), (2, 4));
+        assert_eq!(
+            (repairs.repeated_vertices, repairs.degenerate_faces),
+            (2, 4)
+        );
     }
 
     #[test]
     fn overflowing_coordinates_are_an_error() {
         let huge = flat(&[[0.0, 0.0], [1e30, 0.0], [0.0, 1e30]]);
-        let fault = legalize(vec![huge], &[Material::unknown(true)], &mut Repairs::default());
+        let fault = legalize(
+            vec![huge],
+            &[Material::unknown(true)],
+            &mut Repairs::default(),
+        );
         assert!(fault.unwrap_err().contains("overflows"));
     }
 
@@ -395,7 +484,11 @@ mod tests {
         };
         let (polygons, repairs) = legal(vec![flat(&SQUARE), rotated.clone(), behind.clone()]);
         assert_eq!((polygons.len(), repairs.duplicate_faces), (1, 2));
-        let sides = vec![one_sided(flat(&SQUARE)), one_sided(behind.clone()), one_sided(rotated)];
+        let sides = vec![
+            one_sided(flat(&SQUARE)),
+            one_sided(behind.clone()),
+            one_sided(rotated),
+        ];
         let (polygons, repairs) = legal(sides);
         assert_eq!((polygons.len(), repairs.duplicate_faces), (2, 1));
     }
@@ -403,12 +496,18 @@ mod tests {
     #[test]
     fn a_lamp_on_a_wall_stays_and_lamps_back_to_back_both_stay() {
         let lamp = Material {
-            glow: Some(Glow { light: "lamp".to_owned(), exitance: Rgb::WHITE }),
+            glow: Some(Glow {
+                light: "lamp".to_owned(),
+                exitance: Rgb::WHITE,
+            }),
             ..Material::unknown(true)
         };
         let materials = [Material::unknown(true), lamp];
         let wall = flat(&SQUARE);
-        let shining = Outline { material: 1, ..wall.clone() };
+        let shining = Outline {
+            material: 1,
+            ..wall.clone()
+        };
         let mut behind = shining.clone();
         behind.vertices.reverse();
         let mut repairs = Repairs::default();

@@ -55,27 +55,71 @@ impl Repairs {
         let counts = [
             (self.duplicate_faces, "duplicate faces dropped"),
             (self.degenerate_faces, "faces without area dropped"),
-            (self.repeated_vertices, "faces with repeated vertices mended"),
-            (self.large_polygons, "polygons of more than four vertices triangulated"),
+            (
+                self.repeated_vertices,
+                "faces with repeated vertices mended",
+            ),
+            (
+                self.large_polygons,
+                "polygons of more than four vertices triangulated",
+            ),
             (self.warped_quads, "warped quads triangulated"),
             (self.concave_quads, "concave quads triangulated"),
-            (self.crossed_outlines, "self-crossing outlines filled as far as possible"),
-            (self.recovered_quads, "quads put together from two triangles"),
-            (self.clamped_reflectances, "surfaces with reflectance lowered to 0.98"),
-            (self.default_reflectances, "faces without a material given reflectance 0.5"),
+            (
+                self.crossed_outlines,
+                "self-crossing outlines filled as far as possible",
+            ),
+            (
+                self.recovered_quads,
+                "quads put together from two triangles",
+            ),
+            (
+                self.clamped_reflectances,
+                "surfaces with reflectance lowered to 0.98",
+            ),
+            (
+                self.default_reflectances,
+                "faces without a material given reflectance 0.5",
+            ),
             (self.missing_material_files, "material files not found"),
-            (self.textures_used, "textured materials, averaged per element"),
-            (self.missing_textures, "textures not readable, plain colour used"),
-            (self.missing_texture_coordinates, "textured faces without coordinates averaged"),
-            (self.ignored_texture_options, "materials with texture options ignored"),
-            (self.averaged_emissive_textures, "emissive textures averaged"),
-            (self.ignored_metallic, "materials with metallic factor ignored"),
-            (self.ignored_vertex_colours, "primitives with vertex colours ignored"),
+            (
+                self.textures_used,
+                "textured materials, averaged per element",
+            ),
+            (
+                self.missing_textures,
+                "textures not readable, plain colour used",
+            ),
+            (
+                self.missing_texture_coordinates,
+                "textured faces without coordinates averaged",
+            ),
+            (
+                self.ignored_texture_options,
+                "materials with texture options ignored",
+            ),
+            (
+                self.averaged_emissive_textures,
+                "emissive textures averaged",
+            ),
+            (
+                self.ignored_metallic,
+                "materials with metallic factor ignored",
+            ),
+            (
+                self.ignored_vertex_colours,
+                "primitives with vertex colours ignored",
+            ),
             (self.skipped_points_and_lines, "points and lines skipped"),
-            (self.ignored_light_geometry, "light entries whose place was ignored (emission replaced)"),
+            (
+                self.ignored_light_geometry,
+                "light entries whose place was ignored (emission replaced)",
+            ),
         ];
         let counted = counts.iter().filter(|(count, _)| *count > 0);
-        counted.map(|(count, what)| format!("{what}: {count}")).collect()
+        counted
+            .map(|(count, what)| format!("{what}: {count}"))
+            .collect()
     }
 }
 
@@ -98,10 +142,17 @@ mod tests {
     #[test]
     fn every_count_has_a_line() {
         let counts = serde_json::to_value(Repairs::default()).unwrap();
-        let ones: serde_json::Map<_, _> =
-            counts.as_object().unwrap().keys().map(|key| (key.clone(), 1.into())).collect();
+        let ones: serde_json::Map<_, _> = counts
+            .as_object()
+            .unwrap()
+            .keys()
+            .map(|key| (key.clone(), 1.into()))
+            .collect();
         assert_eq!(all_ones().lines().len(), ones.len());
-        assert_eq!(serde_json::to_value(all_ones()).unwrap(), serde_json::Value::Object(ones));
+        assert_eq!(
+            serde_json::to_value(all_ones()).unwrap(),
+            serde_json::Value::Object(ones)
+        );
     }
 
     fn all_ones() -> Repairs {

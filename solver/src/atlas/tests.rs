@@ -52,7 +52,7 @@ fn sample() -> Vec<u8> {
         quantity: Quantity::Irradiance,
         lights: &[entry("ceiling", 1.0), entry("Lämpchen", 2.0)],
         elements: 8,
-        mesh: Some((&surfaces, mesh)),
+        mesh: Some((&surfaces.map(|s| *s.polygon()), mesh)),
     };
     let mut bytes = vec![0; size(&contents).unwrap()];
     assert_eq!(write(&contents, value, &mut bytes), Ok(bytes.len()));

@@ -6,8 +6,8 @@ use super::{
 };
 use crate::code::{Code, Scale, encode};
 use crate::color::Rgb;
+use crate::geometry::Polygon;
 use crate::mesh::{Mesh, Side};
-use crate::scene::Surface;
 
 /// Name, nominal emission and scale of a light, to be written.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,8 +33,8 @@ pub struct Contents<'a> {
     pub lights: &'a [LightEntry<'a>],
     /// How many elements there are.
     pub elements: u32,
-    /// Surfaces and mesh, for drawing and probing by place; `None` saves their bytes.
-    pub mesh: Option<(&'a [Surface], Mesh<'a>)>,
+    /// Outlines of all surfaces and the mesh, for drawing and probing by place; `None` saves their bytes.
+    pub mesh: Option<(&'a [Polygon], Mesh<'a>)>,
 }
 
 impl Contents<'_> {
@@ -163,9 +163,9 @@ fn lights(lights: &[LightEntry], output: &mut Output) -> Result<(), AtlasError> 
         .try_for_each(|light| output.put(light.name.as_bytes()))
 }
 
-fn mesh_parts(surfaces: &[Surface], mesh: Mesh, output: &mut Output) -> Result<(), AtlasError> {
+fn mesh_parts(surfaces: &[Polygon], mesh: Mesh, output: &mut Output) -> Result<(), AtlasError> {
     for surface in surfaces {
-        let vertices = surface.polygon().vertices();
+        let vertices = surface.vertices();
         let padded = vertices.iter().chain(vertices.last()).take(4);
         for vertex in padded {
             output.f32s(&vertex.to_array())?;
