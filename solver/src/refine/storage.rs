@@ -62,7 +62,11 @@ pub struct Storage<'a, const K: usize> {
 
 /// Storage of fixed capacity for one block of lights, fit for a `static`.
 ///
-/// `ROWS` rows are kept; a row is as long as `ELEMENTS`.
+/// `ROWS` rows are kept; a row is as long as `ELEMENTS`. More rows than patches do not compile:
+///
+/// ```compile_fail
+/// let storage = relume::refine::FixedStorage::<3, 60, 960, 61>::new();
+/// ```
 #[derive(Debug)]
 pub struct FixedStorage<
     const K: usize,

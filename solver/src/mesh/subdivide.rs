@@ -1,132 +1,11 @@
-//! Faces, patches and elements: what shoots, what receives, and how a scene is divided into them.
-//!
-//! A *face* is one side of a surface; a *patch* shoots; an *element* receives and is displayed, and
-//! every patch is divided into elements (substructuring, Cohen et al. 1986). A quad becomes a grid
-//! of `ceil(edge / length)` parts along each of its two directions; a triangle becomes `n * n`
-//! triangles similar to it. Elements are numbered face by face; inside a quad the edge
-//! `v0 -> v3` is the outer loop and `v0 -> v1` the inner one, inside a triangle rows of
-//! growing `t`. A face of reflectance 0 has patches only if it emits, and no elements.
-//!
-//! Counts: ids are `u32`; an edge is divided into at most 65 535 elements; [`MeshStorage`], made
-//! for devices, holds at most 65 536 patches, so that 16 bits name one.
-
-use core::fmt;
-use core::ops::Range;
+//! Division of every polygon into equal parts: grids on quads, similar triangles on triangles.
 
 use glam::Vec2;
-use heapless::Vec;
 
-use crate::color::Rgb;
+use super::{Element, Face, MeshError, MeshSink, Patch, Side};
 use crate::geometry::Polygon;
 use crate::math;
-use crate::scene::{Emission, Scene, Surface};
-
-/// Side of a surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Side {
-    /// Where the vertices run counter-clockwise.
-    Front,
-    /// The other one.
-    Back,
-}
-
-/// One side of a surface, with the range of its elements.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Face {
-    /// Number of the surface.
-    pub surface: u32,
-    /// Which side of it.
-    pub side: Side,
-    /// Outline, its front towards the side that this face is.
-    pub polygon: Polygon,
-    /// What it emits.
-    pub emission: Option<Emission>,
-    /// Number of its first element.
-    pub first_element: u32,
-    /// How many elements it has; 0 for a face of reflectance 0.
-    pub element_count: u32,
-}
-
-/// A part of a face that shoots.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Patch {
-    /// Number of its face.
-    pub face: u32,
-    /// First parameter corner of the part, see [`Polygon::part`].
-    pub from: Vec2,
-    /// Opposite parameter corner.
-    pub to: Vec2,
-    /// Area in m2.
-    pub area: f32,
-}
-
-/// A part of a patch that receives.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Element {
-    /// Number of its patch.
-    pub patch: u32,
-    /// First parameter corner of the part in its face, see [`Polygon::part`].
-    pub from: Vec2,
-    /// Opposite parameter corner.
-    pub to: Vec2,
-    /// Area in m2.
-    pub area: f32,
-    /// Reflectance, in [0, 1) per channel.
-    pub reflectance: Rgb,
-}
-
-impl Face {
-    /// Numbers of its elements.
-    #[must_use]
-    pub fn element_range(&self) -> Range<u32> {
-        self.first_element..self.first_element.saturating_add(self.element_count)
-    }
-}
-
-/// A divided scene.
-#[derive(Clone, Copy, Debug)]
-pub struct Mesh<'a> {
-    /// The faces, in the order of the surfaces, front before back.
-    pub faces: &'a [Face],
-    /// The patches, face by face.
-    pub patches: &'a [Patch],
-    /// The elements, face by face.
-    pub elements: &'a [Element],
-}
-
-impl<'a> Mesh<'a> {
-    /// Outline of a patch; `None` for a number out of range.
-    #[must_use]
-    pub fn patch_polygon(&self, patch: u32) -> Option<Polygon> {
-        let patch = self.patches.get(patch as usize)?;
-        let face = self.faces.get(patch.face as usize)?;
-        Some(face.polygon.part(patch.from, patch.to))
-    }
-
-    /// Face of an element; `None` when the element does not belong to this mesh.
-    #[must_use]
-    pub fn element_face(&self, element: &Element) -> Option<&'a Face> {
-        let patch = self.patches.get(element.patch as usize)?;
-        self.faces.get(patch.face as usize)
-    }
-
-    /// Outline of an element; `None` when the element does not belong to this mesh.
-    #[must_use]
-    pub fn element_polygon(&self, element: &Element) -> Option<Polygon> {
-        Some(
-            self.element_face(element)?
-                .polygon
-                .part(element.from, element.to),
-        )
-    }
-
-    /// What a patch emits.
-    #[must_use]
-    pub fn patch_emission(&self, patch: u32) -> Option<Emission> {
-        let patch = self.patches.get(patch as usize)?;
-        self.faces.get(patch.face as usize)?.emission
-    }
-}
+use crate::scene::{Scene, Surface};
 
 /// Longest edges that a division aims at, in m.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -146,138 +25,6 @@ pub struct Counts {
     pub patches: u32,
     /// Elements.
     pub elements: u32,
-}
-
-/// Why a scene was not divided.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum MeshError {
-    /// A spacing is not a positive finite length.
-    Spacing,
-    /// An edge of this surface needs more than 65 535 elements.
-    TooFine {
-        /// Number of the surface.
-        surface: u32,
-    },
-    /// More faces than the storage holds.
-    TooManyFaces {
-        /// Capacity of the storage.
-        limit: usize,
-    },
-    /// More patches than the storage holds.
-    TooManyPatches {
-        /// Capacity of the storage.
-        limit: usize,
-    },
-    /// More elements than the storage holds.
-    TooManyElements {
-        /// Capacity of the storage.
-        limit: usize,
-    },
-}
-
-impl fmt::Display for MeshError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Spacing => f.write_str("patch and element lengths must be positive and finite"),
-            Self::TooFine { surface } => write!(
-                f,
-                "surface {surface}: an edge needs more than 65535 elements; ask for longer ones"
-            ),
-            Self::TooManyFaces { limit } => {
-                write!(f, "more faces than the storage holds ({limit})")
-            }
-            Self::TooManyPatches { limit } => {
-                write!(f, "more patches than the storage holds ({limit})")
-            }
-            Self::TooManyElements { limit } => {
-                write!(f, "more elements than the storage holds ({limit})")
-            }
-        }
-    }
-}
-
-impl core::error::Error for MeshError {}
-
-/// Where faces, patches and elements are put: one at a time, refused when full.
-pub trait MeshSink {
-    /// Takes a face.
-    ///
-    /// # Errors
-    /// [`MeshError::TooManyFaces`].
-    fn face(&mut self, face: Face) -> Result<(), MeshError>;
-    /// Takes a patch.
-    ///
-    /// # Errors
-    /// [`MeshError::TooManyPatches`].
-    fn patch(&mut self, patch: Patch) -> Result<(), MeshError>;
-    /// Takes an element.
-    ///
-    /// # Errors
-    /// [`MeshError::TooManyElements`].
-    fn element(&mut self, element: Element) -> Result<(), MeshError>;
-}
-
-/// Storage of fixed capacity, fit for a `static`.
-#[derive(Debug)]
-pub struct MeshStorage<const FACES: usize, const PATCHES: usize, const ELEMENTS: usize> {
-    faces: Vec<Face, FACES>,
-    patches: Vec<Patch, PATCHES>,
-    elements: Vec<Element, ELEMENTS>,
-}
-
-impl<const FACES: usize, const PATCHES: usize, const ELEMENTS: usize>
-    MeshStorage<FACES, PATCHES, ELEMENTS>
-{
-    /// Empty storage. More than 65 536 patches do not compile.
-    #[must_use]
-    pub const fn new() -> Self {
-        const {
-            assert!(PATCHES <= 65_536, "patch ids of a device are 16 bits wide");
-        }
-        Self {
-            faces: Vec::new(),
-            patches: Vec::new(),
-            elements: Vec::new(),
-        }
-    }
-
-    /// What is stored.
-    #[must_use]
-    pub fn mesh(&self) -> Mesh<'_> {
-        Mesh {
-            faces: &self.faces,
-            patches: &self.patches,
-            elements: &self.elements,
-        }
-    }
-}
-
-impl<const FACES: usize, const PATCHES: usize, const ELEMENTS: usize> Default
-    for MeshStorage<FACES, PATCHES, ELEMENTS>
-{
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl<const FACES: usize, const PATCHES: usize, const ELEMENTS: usize> MeshSink
-    for MeshStorage<FACES, PATCHES, ELEMENTS>
-{
-    fn face(&mut self, face: Face) -> Result<(), MeshError> {
-        let full = MeshError::TooManyFaces { limit: FACES };
-        self.faces.push(face).map_err(|_| full)
-    }
-
-    fn patch(&mut self, patch: Patch) -> Result<(), MeshError> {
-        let full = MeshError::TooManyPatches { limit: PATCHES };
-        self.patches.push(patch).map_err(|_| full)
-    }
-
-    fn element(&mut self, element: Element) -> Result<(), MeshError> {
-        let full = MeshError::TooManyElements { limit: ELEMENTS };
-        self.elements.push(element).map_err(|_| full)
-    }
 }
 
 /// Divides every face for which `keep(surface, side)` holds into patches and elements.
@@ -462,7 +209,10 @@ fn cells(grid: Grid, is_triangle: bool) -> impl Iterator<Item = (Vec2, Vec2)> {
 #[cfg(test)]
 mod tests {
     extern crate std;
+    use super::super::MeshStorage;
     use super::*;
+    use crate::color::Rgb;
+    use crate::scene::Emission;
     use glam::Vec3;
     use std::vec;
 

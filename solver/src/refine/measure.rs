@@ -1,0 +1,111 @@
+//! What a refinement can tell at any time: residuals, ambient terms, irradiances, counts.
+
+use super::lanes::{address, lane_of};
+use super::{Lanes, PatchState, Refinement};
+use crate::color::Rgb;
+
+impl<const K: usize> Refinement<'_, K> {
+    /// The largest residual of all lights.
+    #[must_use]
+    pub fn residual(&self) -> f32 {
+        self.residual_of(|_| true)
+    }
+
+    pub(super) fn residual_of(&self, admit: impl Fn(&PatchState) -> bool) -> f32 {
+        (0..self.storage.blocks.len())
+            .map(|block| {
+                let residuals = self.block_residuals(block, &admit);
+                residuals.iter().copied().fold(0.0, f32::max)
+            })
+            .fold(0.0, f32::max)
+    }
+
+    /// Residual of one light; 0 for a light that emits nothing or does not exist.
+    #[must_use]
+    pub fn light_residual(&self, light: u32) -> f32 {
+        let (block, lane) = address::<K>(light);
+        let residuals = self.block_residuals(block, |_| true);
+        residuals.get(lane).copied().unwrap_or(0.0)
+    }
+
+    fn block_residuals(&self, block: usize, admit: impl Fn(&PatchState) -> bool) -> [f32; K] {
+        let count = self.mesh.patches.len();
+        let mut power = [0.0; K];
+        let unshot = self.storage.unshot.get(block * count..).unwrap_or_default();
+        let patches = self.mesh.patches.iter().zip(self.storage.patches.iter());
+        for ((patch, state), [r, g, b]) in patches.zip(unshot) {
+            if admit(state) {
+                let channels = r.iter().zip(g).zip(b);
+                for (total, ((r, g), b)) in power.iter_mut().zip(channels) {
+                    *total += (r + g + b) * patch.area;
+                }
+            }
+        }
+        let emitted = self.storage.blocks.get(block).map(|b| b.emitted);
+        for (value, emitted) in power.iter_mut().zip(emitted.unwrap_or([0.0; K])) {
+            *value = if emitted > 0.0 { *value / emitted } else { 0.0 };
+        }
+        power
+    }
+
+    /// Ambient irradiance of a light: what its unshot power would add on average, W/m2.
+    #[must_use]
+    pub fn ambient(&self, light: u32) -> Rgb {
+        let count = self.mesh.patches.len();
+        let (block, lane) = address::<K>(light);
+        let unshot = self.storage.unshot.get(block * count..).unwrap_or_default();
+        let mut power = Rgb::BLACK;
+        for (patch, lanes) in self.mesh.patches.iter().zip(unshot) {
+            power += lane_of(lanes, lane) * patch.area;
+        }
+        let (mut area, mut reflecting) = (0.0, Rgb::BLACK);
+        for element in self.mesh.elements {
+            area += element.area;
+            reflecting += element.reflectance * element.area;
+        }
+        if area <= 0.0 || self.area_shot <= 0.0 {
+            return Rgb::BLACK;
+        }
+        let landing = (self.area_landed / self.area_shot) as f32;
+        let term = |power: f32, reflecting: f32| {
+            power / area * landing / (1.0 - landing * reflecting / area).max(f32::EPSILON)
+        };
+        Rgb::new(
+            term(power.r, reflecting.r),
+            term(power.g, reflecting.g),
+            term(power.b, reflecting.b),
+        )
+    }
+
+    /// Irradiance of an element by a light at unit emission, W/m2, without the ambient term.
+    #[must_use]
+    pub fn irradiance(&self, element: u32, light: u32) -> Rgb {
+        self.lookup(self.storage.irradiance, element, light)
+    }
+
+    /// The direct part of it; zero when direct light is not kept apart.
+    #[must_use]
+    pub fn direct(&self, element: u32, light: u32) -> Rgb {
+        self.lookup(self.storage.direct, element, light)
+    }
+
+    fn lookup(&self, lanes: &[Lanes<K>], element: u32, light: u32) -> Rgb {
+        let (block, lane) = address::<K>(light);
+        let index = block * self.mesh.elements.len() + element as usize;
+        lanes
+            .get(index)
+            .map_or(Rgb::BLACK, |lanes| lane_of(lanes, lane))
+    }
+
+    /// Rows handed in so far; without row storage a patch may count more than once.
+    #[must_use]
+    pub const fn rows_evaluated(&self) -> u32 {
+        self.rows_evaluated
+    }
+
+    /// Shots so far, those along known rows included.
+    #[must_use]
+    pub const fn shots(&self) -> u64 {
+        self.shots
+    }
+}
