@@ -154,10 +154,24 @@ pub fn bake(
         refinement.set_importance(tag, light.importance)?;
     }
     match settings.method {
-        Method::Host => refine(&mut refinement, &view, mesh.view(), &Parallel(&bvh), settings, watch)?,
+        Method::Host => refine(
+            &mut refinement,
+            &view,
+            mesh.view(),
+            &Parallel(&bvh),
+            settings,
+            watch,
+        )?,
         Method::Device => {
             let serial = Serial(Occluders(&scene.surfaces));
-            refine(&mut refinement, &view, mesh.view(), &serial, settings, watch)?;
+            refine(
+                &mut refinement,
+                &view,
+                mesh.view(),
+                &serial,
+                settings,
+                watch,
+            )?;
         }
     }
     Ok(solution(scene, settings, spacing, &mesh, &refinement))
@@ -165,14 +179,26 @@ pub fn bake(
 
 /// Fills rows, one after the other, from one thread or many.
 trait RowFiller {
-    fn luminaire(&self, mesh: &Mesh, luminaire: &relume::scene::Luminaire, far: f32, row: &mut [f32]);
+    fn luminaire(
+        &self,
+        mesh: &Mesh,
+        luminaire: &relume::scene::Luminaire,
+        far: f32,
+        row: &mut [f32],
+    );
     fn patch(&self, mesh: &Mesh, patch: u32, row: &mut [f32]);
 }
 
 struct Serial<'a>(Occluders<'a>);
 
 impl RowFiller for Serial<'_> {
-    fn luminaire(&self, mesh: &Mesh, luminaire: &relume::scene::Luminaire, far: f32, row: &mut [f32]) {
+    fn luminaire(
+        &self,
+        mesh: &Mesh,
+        luminaire: &relume::scene::Luminaire,
+        far: f32,
+        row: &mut [f32],
+    ) {
         luminaire::fill(mesh, luminaire, far, 0, &self.0, row);
     }
 
@@ -184,7 +210,13 @@ impl RowFiller for Serial<'_> {
 struct Parallel<'a, V>(&'a V);
 
 impl<V: Visibility + Sync> RowFiller for Parallel<'_, V> {
-    fn luminaire(&self, mesh: &Mesh, luminaire: &relume::scene::Luminaire, far: f32, row: &mut [f32]) {
+    fn luminaire(
+        &self,
+        mesh: &Mesh,
+        luminaire: &relume::scene::Luminaire,
+        far: f32,
+        row: &mut [f32],
+    ) {
         in_chunks(row, |first, part| {
             luminaire::fill(mesh, luminaire, far, first, self.0, part);
         });
@@ -228,7 +260,10 @@ fn refine(
     // Asking for the next shooter shoots known rows, so both ways to stop come after it: a bake
     // that is interrupted gives the bits of one that was told to stop there.
     while let Some(patch) = refinement.next_shooter() {
-        if settings.shots.is_some_and(|limit| refinement.rows_evaluated() >= limit) {
+        if settings
+            .shots
+            .is_some_and(|limit| refinement.rows_evaluated() >= limit)
+        {
             break;
         }
         let progress = Progress {

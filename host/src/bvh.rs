@@ -11,7 +11,7 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ray::{Ray, RayHit};
-use obvhs::{BvhBuildParams, Boundable};
+use obvhs::{Boundable, BvhBuildParams};
 
 use relume::geometry::Polygon;
 use relume::scene::Surface;
@@ -113,13 +113,12 @@ impl Bvh {
 
 impl Visibility for Bvh {
     fn sees(&self, from: Vec3, to: Vec3) -> bool {
-        self.tree
-            .ray_traverse_miss(segment(from, to), |_, index| {
-                match self.crossing(index, from, to) {
-                    Some(_) => 0.0,
-                    None => f32::INFINITY,
-                }
-            })
+        self.tree.ray_traverse_miss(segment(from, to), |_, index| {
+            match self.crossing(index, from, to) {
+                Some(_) => 0.0,
+                None => f32::INFINITY,
+            }
+        })
     }
 }
 

@@ -64,7 +64,10 @@ pub fn test_mixes(nominal: &[Rgb], names: &[&str]) -> Vec<TestMix> {
             weights: weights.collect(),
         }
     });
-    std::iter::once(all_on).chain(solos).chain(dimmings).collect()
+    std::iter::once(all_on)
+        .chain(solos)
+        .chain(dimmings)
+        .collect()
 }
 
 /// A number in [0, 1) for every seed: SplitMix64 (Steele, Lea and Flood 2014), top 24 bits.
@@ -93,7 +96,14 @@ mod tests {
         let mixes = test_mixes(&[Rgb::WHITE, Rgb::splat(2.0)], &["a", "b"]);
         assert_eq!(mixes.len(), 1 + 2 + 64);
         assert_eq!(mixes[2].weights, [Rgb::BLACK, Rgb::splat(2.0)]);
-        assert!(mixes.iter().all(|mix| mix.weights.iter().all(|w| w.is_legal())));
-        assert_eq!(mixes, test_mixes(&[Rgb::WHITE, Rgb::splat(2.0)], &["a", "b"]));
+        assert!(
+            mixes
+                .iter()
+                .all(|mix| mix.weights.iter().all(|w| w.is_legal()))
+        );
+        assert_eq!(
+            mixes,
+            test_mixes(&[Rgb::WHITE, Rgb::splat(2.0)], &["a", "b"])
+        );
     }
 }

@@ -50,11 +50,16 @@ impl FromStr for Value {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let illegal = || {
-            format!("`{text}` is none of: a factor (0.5), a colour (#ffcc88, 2x#ffcc88), r,g,b")
-        };
+        let illegal =
+            || format!("`{text}` is none of: a factor (0.5), a colour (#ffcc88, 2x#ffcc88), r,g,b");
         let legal = |number: f32| number.is_finite() && number >= 0.0;
-        let number = |text: &str| text.trim().parse().ok().filter(|n| legal(*n)).ok_or_else(illegal);
+        let number = |text: &str| {
+            text.trim()
+                .parse()
+                .ok()
+                .filter(|n| legal(*n))
+                .ok_or_else(illegal)
+        };
         if let Some((factor, hex)) = text.split_once('#') {
             let factor = match factor.strip_suffix('x') {
                 Some(factor) => number(factor)?,
@@ -63,7 +68,10 @@ impl FromStr for Value {
             };
             return Ok(Self::Color(color(hex).ok_or_else(illegal)? * factor));
         }
-        let numbers = text.split(',').map(number).collect::<Result<Vec<f32>, _>>()?;
+        let numbers = text
+            .split(',')
+            .map(number)
+            .collect::<Result<Vec<f32>, _>>()?;
         match numbers[..] {
             [factor] => Ok(Self::Factor(factor)),
             [r, g, b] => Ok(Self::Absolute(Rgb::new(r, g, b))),
@@ -170,7 +178,9 @@ mod tests {
         assert_eq!(weight("#ffffff"), Rgb::splat(4.0));
         assert_eq!(weight("2x#ff0000"), Rgb::new(8.0, 0.0, 0.0));
         assert_eq!(weight("1,0,3.5"), Rgb::new(1.0, 0.0, 3.5));
-        for bad in ["", "x", "-1", "nan", "inf", "#fff", "#gggggg", "2#ffffff", "1,2", "1,2,3,4", "#+12345"] {
+        for bad in [
+            "", "x", "-1", "nan", "inf", "#fff", "#gggggg", "2#ffffff", "1,2", "1,2,3,4", "#+12345",
+        ] {
             assert!(bad.parse::<Value>().is_err(), "{bad}");
         }
     }
@@ -184,6 +194,9 @@ mod tests {
         let unset = mix(&lights(), &[], &[setting("a=0")]).unwrap();
         assert_eq!(unset, [Rgb::BLACK, Rgb::new(2.0, 4.0, 1.0)]);
         let error = mix(&lights(), &[], &[setting("d=1")]).unwrap_err();
-        assert_eq!(error.to_string(), "there is no light `d`; the lights are: a, b=c");
+        assert_eq!(
+            error.to_string(),
+            "there is no light `d`; the lights are: a, b=c"
+        );
     }
 }

@@ -184,7 +184,10 @@ fn unpack_mesh(atlas: &Atlas) -> (Vec<Polygon>, OwnedMesh) {
         .collect();
     let mut mesh = OwnedMesh::default();
     let mut first_element = 0;
-    for (face, number) in (0..stored.face_count()).filter_map(|f| stored.face(f)).zip(0..) {
+    for (face, number) in (0..stored.face_count())
+        .filter_map(|f| stored.face(f))
+        .zip(0..)
+    {
         let own = stored_elements[first_element..]
             .iter()
             .take_while(|element| element.face == number);
@@ -245,8 +248,9 @@ pub fn packing_error(solution: &Solution, atlas: &Atlas) -> Result<PackingError,
         codes_shown: 0.0,
         per_light: Vec::new(),
     };
-    for (TestMix { name, weights }, number) in
-        test_mixes(&solution.nominal_mix(), &names).into_iter().zip(0..)
+    for (TestMix { name, weights }, number) in test_mixes(&solution.nominal_mix(), &names)
+        .into_iter()
+        .zip(0..)
     {
         let exact: Vec<Rgb> = values
             .chunks(lights.max(1))
@@ -259,7 +263,9 @@ pub fn packing_error(solution: &Solution, atlas: &Atlas) -> Result<PackingError,
         let codes = max_codes(&exact, &found);
         let exitance = solution.face_exitance(&weights);
         let shown = |state: &[Rgb]| shown(solution, atlas.quantity(), state, &exitance);
-        worst.codes_shown = worst.codes_shown.max(max_codes(&shown(&exact), &shown(&found)));
+        worst.codes_shown = worst
+            .codes_shown
+            .max(max_codes(&shown(&exact), &shown(&found)));
         if codes > worst.codes || worst.worst_state.is_empty() {
             worst.codes = codes;
             worst.worst_state = name;

@@ -49,7 +49,9 @@ pub enum ProbeError {
         line: u64,
     },
     /// There is no place to look for points.
-    #[error("it carries no mesh, so points have no place in it; pack without --no-mesh, or use --elements")]
+    #[error(
+        "it carries no mesh, so points have no place in it; pack without --no-mesh, or use --elements"
+    )]
     NoMesh,
     /// Direct light was not kept apart.
     #[error("direct light was not kept apart; bake with --split-direct")]
@@ -153,7 +155,11 @@ pub fn probe_elements(solution: &Solution, part: Part) -> Result<Vec<u8>, ProbeE
     check_part(solution, part)?;
     let mut table = Table::new("element")?;
     let lights = solution.lights.len();
-    let elements = solution.contributions.len().checked_div(lights).unwrap_or(0);
+    let elements = solution
+        .contributions
+        .len()
+        .checked_div(lights)
+        .unwrap_or(0);
     for element in 0..elements {
         for (light, tag) in solution.lights.iter().zip(0..) {
             table.row(element, &light.name, value(solution, element, tag, part))?;
@@ -190,7 +196,8 @@ impl Table {
     /// Floats are written with as many digits as bring them back.
     fn row(&mut self, number: usize, light: &str, value: Rgb) -> Result<(), ProbeError> {
         let [r, g, b] = value.to_array().map(written);
-        self.0.write_record([&number.to_string(), light, &r, &g, &b])?;
+        self.0
+            .write_record([&number.to_string(), light, &r, &g, &b])?;
         Ok(())
     }
 
@@ -230,24 +237,31 @@ impl<'a> Places<'a> {
         let faces = solution.mesh.faces.iter();
         Self {
             solution,
-            faces: faces.map(|face| ((face.surface, face.side), face)).collect(),
+            faces: faces
+                .map(|face| ((face.surface, face.side), face))
+                .collect(),
             reach: REACH * diagonal,
         }
     }
 
     fn find(&self, position: Vec3, normal: Vec3) -> Place {
-        let sides = self.solution.surfaces.iter().zip(0..).filter_map(|(outline, surface)| {
-            let cosine = outline.normal().dot(normal);
-            let side = if cosine >= LEAST_COSINE {
-                Side::Front
-            } else if cosine <= -LEAST_COSINE {
-                Side::Back
-            } else {
-                return None;
-            };
-            let distance = distance(outline, position);
-            (distance <= self.reach).then_some((distance, surface, side))
-        });
+        let sides = self
+            .solution
+            .surfaces
+            .iter()
+            .zip(0..)
+            .filter_map(|(outline, surface)| {
+                let cosine = outline.normal().dot(normal);
+                let side = if cosine >= LEAST_COSINE {
+                    Side::Front
+                } else if cosine <= -LEAST_COSINE {
+                    Side::Back
+                } else {
+                    return None;
+                };
+                let distance = distance(outline, position);
+                (distance <= self.reach).then_some((distance, surface, side))
+            });
         let nearest = sides.min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, surface, side)) = nearest else {
             return Place::None;
@@ -264,7 +278,11 @@ impl<'a> Places<'a> {
     fn element_at(&self, face: &Face, position: Vec3) -> Option<usize> {
         let at = face.polygon.parameters(position);
         let range = face.element_range();
-        let elements = self.solution.mesh.elements.get(range.start as usize..range.end as usize)?;
+        let elements = self
+            .solution
+            .mesh
+            .elements
+            .get(range.start as usize..range.end as usize)?;
         let is_triangle = face.polygon.is_triangle();
         let misses = elements.iter().map(|e| outside(e, at, is_triangle));
         let nearest = (range.start as usize..)
@@ -348,7 +366,10 @@ mod tests {
         let probed = probe_points(&solution, &points, Part::Total).unwrap();
         let text = String::from_utf8(probed.csv).unwrap();
         assert_eq!(probed.missing, 1);
-        assert!(text.starts_with("point,light,er,eg,eb\n0,light_0,"), "{text}");
+        assert!(
+            text.starts_with("point,light,er,eg,eb\n0,light_0,"),
+            "{text}"
+        );
         assert!(text.ends_with("1,light_0,nan,nan,nan\n"), "{text}");
     }
 

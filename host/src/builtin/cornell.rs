@@ -15,10 +15,11 @@
 
 use glam::Vec3;
 use relume::color::Rgb;
+use relume::draw::Camera;
 use relume::mesh::Spacing;
 use relume::scene::{Falloff, Source};
 
-use super::{Builder, Builtin, BuiltinError, View, cuboid, reversed};
+use super::{Builder, Builtin, BuiltinError, cuboid, reversed};
 
 const WHITE: Rgb = Rgb::new(0.725, 0.71, 0.68);
 const RED: Rgb = Rgb::new(0.63, 0.065, 0.05);
@@ -123,7 +124,7 @@ pub fn cornell_box() -> Result<Builtin, BuiltinError> {
             element: 0.025,
         },
         // Published: position (278, 273, -800), focal length 35 mm, film 25 mm.
-        view: View {
+        camera: Camera {
             eye: metres(Vec3::new(278.0, 273.0, -800.0)),
             target: metres(Vec3::new(278.0, 273.0, 0.0)),
             up: Vec3::Y,

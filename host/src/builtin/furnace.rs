@@ -5,9 +5,10 @@
 
 use glam::Vec3;
 use relume::color::Rgb;
+use relume::draw::Camera;
 use relume::mesh::Spacing;
 
-use super::{Builder, Builtin, BuiltinError, View, cuboid, reversed};
+use super::{Builder, Builtin, BuiltinError, cuboid, reversed};
 
 /// The unit cube; its light `walls` has the nominal emission `exitance`.
 ///
@@ -49,7 +50,7 @@ fn furnace(
             patch: 0.5,
             element: 0.25,
         },
-        view: View {
+        camera: Camera {
             eye: size * Vec3::new(0.9, 0.9, 0.9),
             target: size * 0.5,
             up: Vec3::Y,

@@ -11,6 +11,7 @@ pub(crate) mod published;
 
 use glam::Vec3;
 use relume::color::Rgb;
+use relume::draw::Camera;
 use relume::mesh::Spacing;
 use relume::scene::{Emission, Luminaire, LuminaireError, Source, Surface, SurfaceError};
 
@@ -28,20 +29,7 @@ pub struct Builtin {
     /// How to divide it.
     pub spacing: Spacing,
     /// From where to look at it.
-    pub view: View,
-}
-
-/// A pinhole camera.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
-    /// Where it stands.
-    pub eye: Vec3,
-    /// What is in the middle of the picture.
-    pub target: Vec3,
-    /// What points upwards in the picture; not parallel to the way it looks.
-    pub up: Vec3,
-    /// Vertical field of view in radians.
-    pub fov: f32,
+    pub camera: Camera,
 }
 
 /// Why a built-in scene could not be made: a parameter is out of its range.

@@ -8,9 +8,10 @@
 
 use glam::Vec3;
 use relume::color::Rgb;
+use relume::draw::Camera;
 use relume::mesh::Spacing;
 
-use super::{Builder, Builtin, BuiltinError, View};
+use super::{Builder, Builtin, BuiltinError};
 
 /// How many lamps the room has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -118,7 +119,7 @@ pub fn paper_room(lamps: PaperLamps) -> Result<Builtin, BuiltinError> {
             patch: 1.0,
             element: 0.25,
         },
-        view: View {
+        camera: Camera {
             eye: Vec3::new(2.8, 2.2, 0.2),
             target: Vec3::new(1.1, 1.0, 1.8),
             up: Vec3::Y,

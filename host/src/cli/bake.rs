@@ -84,7 +84,12 @@ impl Arguments {
 
 pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     let path = arguments.scene.display().to_string();
-    let output = output_path(arguments.output.as_deref(), &arguments.scene, "solution", json);
+    let output = output_path(
+        arguments.output.as_deref(),
+        &arguments.scene,
+        "solution",
+        json,
+    );
     let imported = import::load(&arguments.scene, arguments.lights.as_deref())?;
     for line in imported.repairs.lines() {
         eprintln!("{path}: {line}");

@@ -60,7 +60,10 @@ fn of_atlas(atlas: &Atlas, bytes: usize) -> Value {
             "scale": light.scale.value(),
         })
     });
-    let (n, k) = (u64::from(atlas.element_count()), u64::from(atlas.light_count()));
+    let (n, k) = (
+        u64::from(atlas.element_count()),
+        u64::from(atlas.light_count()),
+    );
     json!({
         "kind": "atlas",
         "bytes": bytes,

@@ -37,7 +37,10 @@ const MIXES: [(&str, &[&str]); 5] = [
     ("evening", &["ceiling=0.05", "lamp=2"]),
     ("stage", &["ceiling=0", "lamp=0.3", "spot=1.5x#ff5040"]),
     ("cold", &["ceiling=#9fc4ff", "spot=0", "lamp=0"]),
-    ("coloured", &["ceiling=0.1", "spot=#40ff80", "lamp=2x#4060ff"]),
+    (
+        "coloured",
+        &["ceiling=0.1", "spot=#40ff80", "lamp=2x#4060ff"],
+    ),
 ];
 
 /// Files that were written, in order.
@@ -75,7 +78,11 @@ struct Stage<'a> {
 impl Stage<'_> {
     fn image(&self, irradiance: &[Rgb], mix: &[Rgb]) -> Result<LinearImage> {
         let exitance = self.solution.face_exitance(mix);
-        Ok(render(&self.relit(irradiance, &exitance), &self.camera, f32::INFINITY)?)
+        Ok(render(
+            &self.relit(irradiance, &exitance),
+            &self.camera,
+            f32::INFINITY,
+        )?)
     }
 
     fn relit<'b>(&'b self, irradiance: &'b [Rgb], exitance: &'b [Rgb]) -> Relit<'b> {
@@ -116,7 +123,7 @@ pub fn run() -> Result<Outcome> {
     let Builtin {
         scene,
         spacing,
-        view,
+        camera,
     } = cornell_box()?;
     let settings = Settings {
         patch: Some(spacing.patch),
@@ -141,10 +148,10 @@ pub fn run() -> Result<Outcome> {
     folder.write("cornell.solution", &solution_bytes)?;
     folder.write("cornell.atlas", &atlas_bytes)?;
     let viewpoint = Viewpoint {
-        eye: view.eye,
-        target: view.target,
-        up: view.up,
-        fov: view.fov,
+        eye: camera.eye,
+        target: camera.target,
+        up: camera.up,
+        fov: camera.fov,
     };
     let stage = Stage {
         solution,
@@ -153,10 +160,19 @@ pub fn run() -> Result<Outcome> {
     };
     let relightings = pictures(&stage, &mut folder)?;
     light_layers(&stage, &mut folder)?;
-    let report = report(&baked, &error, &relightings, atlas_bytes.len(), solution_bytes.len());
+    let report = report(
+        &baked,
+        &error,
+        &relightings,
+        atlas_bytes.len(),
+        solution_bytes.len(),
+    );
     folder.write("report.txt", report.as_bytes())?;
     eprint!("{report}");
-    eprintln!("{FOLDER}/ holds {} files; see {FOLDER}/overview.png", folder.0.len());
+    eprintln!(
+        "{FOLDER}/ holds {} files; see {FOLDER}/overview.png",
+        folder.0.len()
+    );
 
     Ok(Outcome {
         interrupted: baked.interrupted,
@@ -187,7 +203,9 @@ fn pictures(stage: &Stage, folder: &mut Folder) -> Result<Vec<Relighting>> {
     let lights = &stage.solution.lights;
     let mut relightings = Vec::new();
     for light in lights {
-        let only: Setting = format!("{}=1", light.name).parse().map_err(anyhow::Error::msg)?;
+        let only: Setting = format!("{}=1", light.name)
+            .parse()
+            .map_err(anyhow::Error::msg)?;
         let mix = mix(lights, &[only], &[])?;
         let relit = stage.relight(&format!("{} alone", light.name), &mix)?;
         folder.png(&format!("light-{}.png", light.name), &relit.picture)?;
@@ -197,7 +215,10 @@ fn pictures(stage: &Stage, folder: &mut Folder) -> Result<Vec<Relighting>> {
         let set: Result<Vec<Setting>, String> = settings.iter().map(|s| s.parse()).collect();
         let mix = mix(lights, &[], &set.map_err(anyhow::Error::msg)?)?;
         let relit = stage.relight(name, &mix)?;
-        folder.png(&format!("mix-{}.png", name.replace(' ', "-")), &relit.picture)?;
+        folder.png(
+            &format!("mix-{}.png", name.replace(' ', "-")),
+            &relit.picture,
+        )?;
         relightings.push(relit);
     }
     for relit in &relightings {
@@ -272,7 +293,10 @@ fn report(
         human_bytes(elements * solution.lights.len() * 3),
     ));
     line(String::new());
-    line(format!("{:<12} {:>9} {:>14} {:>10}", "light", "residual", "error (codes)", "codes"));
+    line(format!(
+        "{:<12} {:>9} {:>14} {:>10}",
+        "light", "residual", "error (codes)", "codes"
+    ));
     for (light, codes) in solution.lights.iter().zip(&error.per_light) {
         line(format!(
             "{:<12} {:>9.1e} {:>14.2} {:>10}",
@@ -283,7 +307,10 @@ fn report(
         ));
     }
     line(String::new());
-    line(format!("{:<20} {:>9} {:>14}", "mix", "exposure", "error (codes)"));
+    line(format!(
+        "{:<20} {:>9} {:>14}",
+        "mix", "exposure", "error (codes)"
+    ));
     for relit in relightings {
         line(format!(
             "{:<20} {:>9.3} {:>14.2}",

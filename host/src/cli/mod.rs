@@ -109,7 +109,11 @@ fn output_path(given: Option<&Path>, input: &Path, extension: &str, json: bool) 
 }
 
 fn wrong_usage(message: &str) -> ! {
-    clap::Error::raw(clap::error::ErrorKind::ArgumentConflict, format!("{message}\n")).exit()
+    clap::Error::raw(
+        clap::error::ErrorKind::ArgumentConflict,
+        format!("{message}\n"),
+    )
+    .exit()
 }
 
 fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {

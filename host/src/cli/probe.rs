@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::load::{Loaded, load, read};
 use super::{Outcome, output_path, write_file};
-use crate::probe::{Part, Probed, ProbeError, probe_elements, probe_points, read_points};
+use crate::probe::{Part, ProbeError, Probed, probe_elements, probe_points, read_points};
 
 #[derive(Debug, Args)]
 pub struct Arguments {

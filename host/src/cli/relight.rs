@@ -124,7 +124,10 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     let camera = Camera::new(viewpoint, width, height).context("camera")?;
 
     let (bytes, exposure) = if is_exr {
-        (exr::encode_rgb(&render(&relit, &camera, f32::INFINITY)?)?, None)
+        (
+            exr::encode_rgb(&render(&relit, &camera, f32::INFINITY)?)?,
+            None,
+        )
     } else {
         let (pixmap, factor) = show(&relit, &camera, arguments.exposure, BACKGROUND)?;
         (picture::encode_png(&pixmap)?, Some(factor))

@@ -52,7 +52,11 @@ fn push<T>(list: &mut Vec<T>, item: T, full: MeshError) -> Result<(), MeshError>
 
 impl MeshSink for OwnedMesh {
     fn face(&mut self, face: Face) -> Result<(), MeshError> {
-        push(&mut self.faces, face, MeshError::TooManyFaces { limit: LIMIT })
+        push(
+            &mut self.faces,
+            face,
+            MeshError::TooManyFaces { limit: LIMIT },
+        )
     }
 
     fn patch(&mut self, patch: Patch) -> Result<(), MeshError> {
@@ -93,7 +97,12 @@ pub fn spacing(scene: &Scene, patch: Option<f32>, element: Option<f32>) -> Spaci
 ///
 /// # Errors
 /// [`MeshError`] as [`subdivide`] reports it.
-pub fn build(scene: &OwnedScene, view: &Scene, spacing: Spacing, bvh: &Bvh) -> Result<OwnedMesh, MeshError> {
+pub fn build(
+    scene: &OwnedScene,
+    view: &Scene,
+    spacing: Spacing,
+    bvh: &Bvh,
+) -> Result<OwnedMesh, MeshError> {
     let reached = reach::reached_faces(view, spacing, bvh)?;
     let mut mesh = OwnedMesh::default();
     let keep = |surface: u32, side: Side| reached.contains(surface, side);
@@ -114,7 +123,9 @@ fn apply_textures(scene: &OwnedScene, mesh: &mut OwnedMesh) {
             Side::Back => texture.flipped(),
         };
         let range = face.element_range();
-        let own = mesh.elements.get_mut(range.start as usize..range.end as usize);
+        let own = mesh
+            .elements
+            .get_mut(range.start as usize..range.end as usize);
         for element in own.unwrap_or_default() {
             element.reflectance = texture.mean_over(element.from, element.to);
         }

@@ -47,7 +47,11 @@ const fn side_index(side: Side) -> usize {
 ///
 /// # Errors
 /// [`MeshError`] when the parts would be too many.
-pub fn reached_faces(scene: &Scene, spacing: Spacing, bvh: &Bvh) -> Result<ReachedFaces, MeshError> {
+pub fn reached_faces(
+    scene: &Scene,
+    spacing: Spacing,
+    bvh: &Bvh,
+) -> Result<ReachedFaces, MeshError> {
     let mut parts = OwnedMesh::default();
     let coarse = Spacing {
         element: spacing.patch,

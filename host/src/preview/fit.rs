@@ -71,12 +71,10 @@ impl Bounds {
 }
 
 impl Camera {
-    /// The camera of the module's rule for a picture of `width` x `height` pixels.
+    /// The camera at [`Viewpoint::fit`] for a picture of `width` x `height` pixels.
     ///
     /// # Errors
     /// [`CameraError::NothingToSee`] without polygons, [`CameraError::Size`].
-    ///
-    /// The rule is stated where [`Viewpoint::fit`] is.
     pub fn fit(polygons: &[Polygon], width: u32, height: u32) -> Result<Self, CameraError> {
         let aspect = width as f32 / height.max(1) as f32;
         let view = Viewpoint::fit(polygons, aspect).ok_or(CameraError::NothingToSee)?;
@@ -86,10 +84,12 @@ impl Camera {
 
 impl Viewpoint {
     /// Where to stand by default, for a picture `aspect` times as wide as high; `None` without
-    /// polygons.
+    /// polygons. Up is +Y.
     ///
-    /// Through the open side of a room that is cut open; from an upper corner of a closed room;
-    /// from outside and above for an object in the open.
+    /// A room with one or two open sides (of +z, -z, +x, -x) is seen straight through the most
+    /// open one, a closed room from the inner corner with the longest mean free view, and what is
+    /// open on more sides from outside and above. A side is open when at most a quarter of the
+    /// rays that enter there meet a surface in the first quarter of the scene's bounding box.
     #[must_use]
     pub fn fit(polygons: &[Polygon], aspect: f32) -> Option<Self> {
         let bounds = Bounds::new(polygons)?;

@@ -64,8 +64,8 @@ struct Outline {
 }
 
 impl Outline {
-    /// The outline of a facet whose front faces the eye.
-    fn new(camera: &Camera, facet: &Facet, number: u32) -> Self {
+    /// The outline of a facet whose front faces the eye; `None` when the picture shows none of it.
+    fn new(camera: &Camera, facet: &Facet, number: u32) -> Option<Self> {
         let corners: Vec<DVec3> = facet
             .polygon
             .vertices()
@@ -92,15 +92,18 @@ impl Outline {
         let scale = bias / normal.dot(corners[0]);
         let nearness = camera.line(normal).map(|coefficient| coefficient * scale);
 
-        let on_screen: Option<Vec<[f64; 2]>> = corners.iter().map(|p| camera.project(*p)).collect();
-        let [x, y] = [0, 1].map(|axis| extent(on_screen.as_deref(), axis, widening));
-        Self {
+        let on_screen: Vec<_> = corners.iter().map(|p| camera.project(*p)).collect();
+        let [x, y] = [0, 1].map(|axis| extent(&on_screen, axis, widening));
+        let (width, height) = camera.size();
+        let is_beside = x[1] < 0.0 || x[0] > width.into() || y[1] < 0.0 || y[0] > height.into();
+        let is_behind = on_screen.iter().all(Option::is_none);
+        (!is_beside && !is_behind).then_some(Self {
             facet: number,
             edges: edges.collect(),
             nearness,
             x,
             y,
-        }
+        })
     }
 
     /// The sample rows that it may reach, out of some.
@@ -142,15 +145,16 @@ fn in_pixels([a, b, c]: [f64; 3]) -> [f64; 3] {
 }
 
 /// Smallest and largest coordinate of an outline, widened; everything if it reaches behind.
-fn extent(on_screen: Option<&[[f64; 2]]>, axis: usize, widening: f64) -> [f64; 2] {
-    let Some(points) = on_screen else {
-        return [f64::NEG_INFINITY, f64::INFINITY];
-    };
-    let along = points.iter().map(|point| point[axis]);
-    [
-        along.clone().fold(f64::INFINITY, f64::min) - widening,
-        along.fold(f64::NEG_INFINITY, f64::max) + widening,
-    ]
+fn extent(on_screen: &[Option<[f64; 2]>], axis: usize, widening: f64) -> [f64; 2] {
+    let mut extent = [f64::INFINITY, f64::NEG_INFINITY];
+    for point in on_screen {
+        let Some(point) = point else {
+            return [f64::NEG_INFINITY, f64::INFINITY];
+        };
+        extent[0] = extent[0].min(point[axis] - widening);
+        extent[1] = extent[1].max(point[axis] + widening);
+    }
+    extent
 }
 
 /// What a sample sees.
@@ -166,7 +170,7 @@ pub(super) fn paint(camera: &Camera, facets: &[Facet], brightest: f32) -> Linear
     let outlines: Vec<Outline> = facets
         .iter()
         .zip(0..NOTHING)
-        .map(|(facet, number)| Outline::new(camera, facet, number))
+        .filter_map(|(facet, number)| Outline::new(camera, facet, number))
         .collect();
 
     let (width, height) = camera.size();

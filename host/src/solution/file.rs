@@ -99,7 +99,11 @@ pub fn write(solution: &Solution) -> Vec<u8> {
         output.rgb(light.emission);
         output.f32s(&[light.residual]);
     }
-    for value in solution.contributions.iter().chain(solution.direct.iter().flatten()) {
+    for value in solution
+        .contributions
+        .iter()
+        .chain(solution.direct.iter().flatten())
+    {
         output.rgb(*value);
     }
     output.u32(CRC.checksum(&output.0));
@@ -244,7 +248,9 @@ fn read_mesh(
         let corners = input.corners()?;
         let reflectance = Reflectance::new(input.rgb()?);
         let face = patches.get(patch as usize).map(|patch| patch.face);
-        let outline = face.and_then(|face| faces.get(face as usize)).map(|f| &f.polygon);
+        let outline = face
+            .and_then(|face| faces.get(face as usize))
+            .map(|f| &f.polygon);
         let parts = corners.zip(outline).zip(reflectance);
         Ok(parts.map(|(((from, to), outline), reflectance)| Element {
             patch,
@@ -402,7 +408,9 @@ mod tests {
             residual: 0.1,
             ..Settings::default()
         };
-        let scene = builtin::paper_room(builtin::PaperLamps::Three).unwrap().scene;
+        let scene = builtin::paper_room(builtin::PaperLamps::Three)
+            .unwrap()
+            .scene;
         bake(&scene, &settings, &mut |_| ControlFlow::Continue(())).unwrap()
     }
 
