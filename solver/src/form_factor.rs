@@ -210,6 +210,10 @@ pub fn row(mesh: &Mesh, patch: u32, visibility: &impl Visibility, row: &mut [f32
 mod tests {
     extern crate std;
     use super::*;
+    use crate::color::Rgb;
+    use crate::scene::Surface;
+    use crate::visibility::Occluders;
+    use proptest::prelude::*;
     use std::vec::Vec;
 
     struct Open;
@@ -299,5 +303,62 @@ mod tests {
             .map(|face| Shooter::new(*face).form_factor(&receiver, &Open))
             .sum();
         assert!((sum - 1.0).abs() < 1e-5, "{sum}");
+    }
+
+    /// A parallelogram anywhere, of any size and slenderness.
+    fn parallelogram() -> impl Strategy<Value = Polygon> {
+        let coordinate = || prop_oneof![-1.0_f32..1.0, Just(0.0), Just(1.0), -1e-5_f32..1e-5];
+        let vector = || [coordinate(), coordinate(), coordinate()].prop_map(Vec3::from_array);
+        let slenderness = prop_oneof![Just(1.0_f32), 1e-4_f32..1.0];
+        (vector(), vector(), vector(), slenderness).prop_filter_map(
+            "no area",
+            |(origin, u, v, slenderness)| {
+                let v = v * slenderness;
+                Polygon::new(&[origin, origin + u, origin + u + v, origin + v]).ok()
+            },
+        )
+    }
+
+    proptest! {
+        #[test]
+        fn any_pair_has_a_finite_factor_between_zero_and_one(
+            shooter in parallelogram(),
+            receiver in parallelogram(),
+            scale in prop_oneof![Just(1.0_f32), Just(1e-6), Just(1e6)],
+        ) {
+            let scaled = |p: &Polygon| {
+                let vertices: Vec<Vec3> = p.vertices().iter().map(|v| *v * scale).collect();
+                Polygon::new(&vertices)
+            };
+            prop_assume!(scaled(&shooter).is_ok() && scaled(&receiver).is_ok());
+            let shooter = Shooter::new(scaled(&shooter).unwrap());
+            let factor = shooter.form_factor(&scaled(&receiver).unwrap(), &Open);
+            prop_assert!((0.0..=1.0).contains(&factor), "{factor}");
+        }
+
+        #[test]
+        fn blockers_never_add_light(
+            shooter in parallelogram(),
+            receiver in parallelogram(),
+            blocker in parallelogram(),
+        ) {
+            let shooter = Shooter::new(shooter);
+            let open = shooter.form_factor(&receiver, &Open);
+            let surface = Surface::new(0, blocker.vertices(), Rgb::BLACK).unwrap();
+            let blocked = shooter.form_factor(&receiver, &Occluders(&[surface]));
+            prop_assert!(blocked <= open * 1.000_001, "{blocked} {open}");
+        }
+
+        #[test]
+        fn scale_does_not_change_a_factor(shooter in parallelogram(), receiver in parallelogram()) {
+            let doubled = |p: &Polygon| {
+                let vertices: Vec<Vec3> = p.vertices().iter().map(|v| *v * 1024.0).collect();
+                Polygon::new(&vertices).unwrap()
+            };
+            let small = Shooter::new(shooter).form_factor(&receiver, &Open);
+            let large = Shooter::new(doubled(&shooter)).form_factor(&doubled(&receiver), &Open);
+            // Powers of two are exact, but for what rounds at the planes' tolerances.
+            prop_assert!((small - large).abs() <= 1e-5, "{small} {large}");
+        }
     }
 }
