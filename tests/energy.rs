@@ -104,12 +104,13 @@ fn form_factors_between_patches_are_reciprocal() {
         }
     }
     let (mut difference, mut total) = (0.0, 0.0);
-    for i in 0..count {
-        for j in 0..i {
-            let both_reflect = power[i][j] > 0.0 && power[j][i] > 0.0;
+    for (i, from_i) in power.iter().enumerate() {
+        for (from_j, to_j) in power.iter().zip(from_i).take(i) {
+            let (to_j, to_i) = (*to_j, from_j[i]);
+            let both_reflect = to_j > 0.0 && to_i > 0.0;
             if both_reflect {
-                difference += (power[i][j] - power[j][i]).abs();
-                total += power[i][j];
+                difference += (to_j - to_i).abs();
+                total += to_j;
             }
         }
     }

@@ -21,7 +21,7 @@ use crate::solution::Solution;
 const REACH: f32 = 1e-3;
 
 /// Cosine of the largest angle between a point's normal and its surface's: 10 degrees.
-const LEAST_COSINE: f32 = 0.984_807_73;
+const LEAST_COSINE: f32 = 0.984_807_8;
 
 /// A surface point to be probed.
 #[derive(Clone, Copy, Debug, Deserialize)]

@@ -59,7 +59,7 @@ fn furnaces_refuse_what_is_no_reflectance_or_exitance() {
 
 #[test]
 fn the_cornell_box_is_open_to_the_viewer_only() {
-    let Builtin { scene, view, .. } = cornell_box().unwrap();
+    let Builtin { scene, camera, .. } = cornell_box().unwrap();
     let (walls, rest) = scene.surfaces.split_at(5);
     let (blocks, lamps) = rest.split_at(10);
     let middle = Vec3::new(0.2764, 0.2744, 0.2796);
@@ -83,7 +83,7 @@ fn the_cornell_box_is_open_to_the_viewer_only() {
     }
     assert!((area(lamps) - 0.130 * 0.105 - 0.08 * 0.12).abs() < 1e-6);
     assert!(face(lamps, middle));
-    assert!(vector_area(walls).dot((view.target - view.eye).as_dvec3()) < 0.0);
+    assert!(vector_area(walls).dot((camera.target - camera.eye).as_dvec3()) < 0.0);
 }
 
 #[test]

@@ -152,19 +152,14 @@ impl Draft {
     }
 }
 
-/// The reflectance of a file's numbers, refused when a channel is negative or not finite.
-pub(super) fn legal_reflectance(key: &str, value: [f32; 3]) -> Result<Rgb, String> {
-    legal(key, value)
-}
-
 /// The exitance of a radiance: `M = pi L`. Zero emits nothing.
 pub(super) fn exitance(key: &str, radiance: [f32; 3]) -> Result<Option<Rgb>, String> {
-    let radiance = legal(key, radiance)?;
+    let radiance = legal_rgb(key, radiance)?;
     Ok((radiance.max_channel() > 0.0).then_some(radiance * std::f32::consts::PI))
 }
 
-/// Every channel finite and not negative.
-fn legal(key: &str, [r, g, b]: [f32; 3]) -> Result<Rgb, String> {
+/// A file's numbers, refused when a channel is negative or not finite.
+pub(super) fn legal_rgb(key: &str, [r, g, b]: [f32; 3]) -> Result<Rgb, String> {
     let value = Rgb::new(r, g, b);
     if value.is_legal() {
         return Ok(value);

@@ -16,7 +16,7 @@ use ::gltf::json::{self, Index, Root};
 use glam::Vec2;
 use relume::color::Rgb;
 
-use super::draft::{Draft, Glow, Material, exitance, legal_reflectance};
+use super::draft::{Draft, Glow, Material, exitance, legal_rgb};
 use super::error::ImportError;
 use super::gltf_data::Data;
 use super::repairs::Repairs;
@@ -132,7 +132,7 @@ impl Materials {
         }
         let [r, g, b, _] = pbr.base_color_factor.0;
         let mut material = Material {
-            reflectance: legal_reflectance("baseColorFactor", [r, g, b])?,
+            reflectance: legal_rgb("baseColorFactor", [r, g, b])?,
             texture: None,
             two_sided: source.double_sided,
             glow: None,

@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use relume::color::Rgb;
 
-use super::draft::{DEFAULT_REFLECTANCE, Glow, Material, exitance, legal_reflectance};
+use super::draft::{DEFAULT_REFLECTANCE, Glow, Material, exitance, legal_rgb};
 use super::error::{ImportError, read_text};
 use super::obj_text::plain_mtl;
 use super::repairs::Repairs;
@@ -108,7 +108,7 @@ impl Library {
     ) -> Result<Material, String> {
         let reflectance = material
             .diffuse
-            .map(|diffuse| legal_reflectance("Kd", diffuse))
+            .map(|diffuse| legal_rgb("Kd", diffuse))
             .transpose()?;
         let texture = material.diffuse_texture.as_deref();
         let texture = texture.and_then(|statement| self.image(path, statement, repairs));

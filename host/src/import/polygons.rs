@@ -26,7 +26,7 @@ use super::repairs::Repairs;
 /// Most vertices of one polygon: ear clipping takes the square of it, the cube at worst.
 pub(super) const MOST_CORNERS: usize = 4096;
 
-/// How much of an outline's area its triangles may miss before it counts as self-crossing.
+/// How far the area of the triangles may lie off the outline's before that is counted.
 const UNFILLED: f64 = 1e-4;
 
 /// A polygon that the solver takes.
@@ -53,8 +53,13 @@ pub(super) fn legalize(
     repairs: &mut Repairs,
 ) -> Result<Vec<Outline>, String> {
     let mut pieces = Vec::with_capacity(outlines.len());
-    for outline in outlines {
-        cut(outline, &mut pieces, repairs)?;
+    for (outline, number) in outlines.into_iter().zip(1..) {
+        cut(outline, &mut pieces, repairs).map_err(|TooLarge| {
+            format!(
+                "polygon {number} has coordinates so large that its area overflows; use a larger \
+                 unit of length"
+            )
+        })?;
     }
     drop_duplicates(&mut pieces, materials, repairs);
     let recovered_before = repairs.recovered_quads;
@@ -65,8 +70,15 @@ pub(super) fn legalize(
     Ok(pieces.into_iter().map(|piece| piece.outline).collect())
 }
 
+/// Coordinates whose squares are no numbers any more.
+struct TooLarge;
+
 /// Adds the outline as it is, or its triangles.
-fn cut(mut outline: Outline, pieces: &mut Vec<Piece>, repairs: &mut Repairs) -> Result<(), String> {
+fn cut(
+    mut outline: Outline,
+    pieces: &mut Vec<Piece>,
+    repairs: &mut Repairs,
+) -> Result<(), TooLarge> {
     if drop_repeated_vertices(&mut outline) {
         repairs.repeated_vertices += 1;
     }
@@ -78,10 +90,7 @@ fn cut(mut outline: Outline, pieces: &mut Vec<Piece>, repairs: &mut Repairs) -> 
         Err(fault) => fault,
     };
     if fault == PolygonError::NotFinite {
-        return Err(
-            "a face has coordinates so large that its area overflows; use a larger unit of length"
-                .to_owned(),
-        );
+        return Err(TooLarge);
     }
 
     let first = pieces.len();
@@ -468,7 +477,11 @@ mod tests {
             &[Material::unknown(true)],
             &mut Repairs::default(),
         );
-        assert!(fault.unwrap_err().contains("overflows"));
+        assert!(
+            fault
+                .unwrap_err()
+                .starts_with("polygon 1 has coordinates so large")
+        );
     }
 
     #[test]

@@ -17,7 +17,8 @@ pub struct Repairs {
     pub warped_quads: usize,
     /// Concave quads, triangulated.
     pub concave_quads: usize,
-    /// Faces whose triangles do not fill them exactly, because the outline crosses itself.
+    /// Triangulated faces whose triangles have another area than the outline, because it crosses
+    /// itself or is far from flat.
     pub crossed_outlines: usize,
     /// Quads put together from two triangles.
     pub recovered_quads: usize,
@@ -67,7 +68,7 @@ impl Repairs {
             (self.concave_quads, "concave quads triangulated"),
             (
                 self.crossed_outlines,
-                "self-crossing outlines filled as far as possible",
+                "outlines crossed or not flat, filled as far as possible",
             ),
             (
                 self.recovered_quads,

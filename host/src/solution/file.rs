@@ -156,7 +156,7 @@ impl Output {
 /// A solution from bytes.
 ///
 /// # Errors
-/// [`FileError`] for anything that [`write`] does not write.
+/// [`FileError`] for anything that [`write()`] does not write.
 pub fn read(bytes: &[u8]) -> Result<Solution, FileError> {
     if !bytes.starts_with(&MAGIC) {
         return Err(FileError::NotASolution);

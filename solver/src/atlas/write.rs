@@ -60,7 +60,7 @@ impl Contents<'_> {
     }
 }
 
-/// Bytes that [`write`] needs.
+/// Bytes that [`write()`] needs.
 ///
 /// # Errors
 /// [`AtlasError::Illegal`] for counts that the format cannot hold.

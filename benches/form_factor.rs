@@ -1,0 +1,86 @@
+//! Form factors: pairs per second, without and with shadow rays, on one thread.
+//!
+//! The rows of all patches of the paper's room. A pair is an element and a patch of which neither is
+//! wholly behind the other; the others are found out first and cost little. `open` asks no
+//! rays; the others ask 16 a pair (4 at each of 4 receiver points), of all 20 surfaces one
+//! after the other or of the tree. `point` is Lambert's formula alone, one point and one quad.
+
+mod scenes;
+
+use std::hint::black_box;
+
+use criterion::{Criterion, Throughput};
+use glam::Vec3;
+use relume::form_factor::{self, point_to_polygon};
+use relume::mesh::Mesh;
+use relume::visibility::{Occluders, Visibility};
+use relume_host::builtin::PaperLamps;
+use relume_host::bvh::Bvh;
+
+/// Nothing hides anything.
+struct Open;
+
+impl Visibility for Open {
+    fn sees(&self, _: Vec3, _: Vec3) -> bool {
+        true
+    }
+}
+
+fn main() {
+    let mut criterion = scenes::criterion();
+    point(&mut criterion);
+    rows(&mut criterion);
+    criterion.final_summary();
+}
+
+fn point(criterion: &mut Criterion) {
+    let quad = [(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)].map(|(x, y)| Vec3::new(x, y, 1.0));
+    // The second receiver has the quad half below its horizon.
+    for (name, normal) in [("point", Vec3::Z), ("point, clipped", Vec3::X)] {
+        criterion.bench_function(&format!("form_factor/{name}"), |bencher| {
+            let at = Vec3::new(0.5, 0.5, 0.0);
+            bencher.iter(|| point_to_polygon(black_box(at), black_box(normal), black_box(&quad)));
+        });
+    }
+}
+
+fn rows(criterion: &mut Criterion) {
+    let room = scenes::room(PaperLamps::Eight);
+    let owned = scenes::meshed(&room);
+    let mesh = owned.view();
+    let (brute, bvh) = (
+        Occluders(&room.scene.surfaces),
+        Bvh::new(&room.scene.surfaces),
+    );
+    let mut row = vec![0.0; mesh.elements.len()];
+    let pairs = facing_pairs(&mesh, &mut row);
+
+    let mut group = criterion.benchmark_group("form_factor/rows");
+    group.throughput(Throughput::Elements(pairs));
+    group.bench_function("open", |bencher| {
+        bencher.iter(|| all_rows(&mesh, &Open, &mut row));
+    });
+    group.bench_function("16 rays, brute force", |bencher| {
+        bencher.iter(|| all_rows(&mesh, &brute, &mut row));
+    });
+    group.bench_function("16 rays, tree", |bencher| {
+        bencher.iter(|| all_rows(&mesh, &bvh, &mut row));
+    });
+    group.finish();
+}
+
+fn all_rows(mesh: &Mesh, visibility: &impl Visibility, row: &mut [f32]) {
+    for patch in 0..mesh.patches.len() as u32 {
+        form_factor::row(mesh, patch, visibility, row);
+        black_box(&row);
+    }
+}
+
+fn facing_pairs(mesh: &Mesh, row: &mut [f32]) -> u64 {
+    let patches = 0..mesh.patches.len() as u32;
+    let facing = patches.map(|patch| {
+        form_factor::row(mesh, patch, &Open, row);
+        row.iter().filter(|factor| **factor > 0.0).count() as u64
+    });
+    facing.sum()
+}

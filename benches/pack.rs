@@ -1,0 +1,83 @@
+//! Packing: codes and atlas bytes per second.
+//!
+//! The paper's room with 8 lights, 960 x 8 contributions of three channels: `encode` and `decode`
+//! work on the values alone, in values per second; `pack` adds scales and bytes, `parse` checks
+//! the bytes again (checksum and every value), `unpack` makes a solution of them.
+
+mod scenes;
+
+use std::hint::black_box;
+
+use criterion::{Criterion, Throughput};
+use relume::atlas::Atlas;
+use relume::code::{Code, DecodeTable, encode};
+use relume_host::builtin::PaperLamps;
+use relume_host::pack::{Format, pack, unpack};
+use relume_host::solution::Solution;
+
+fn main() {
+    let mut criterion = scenes::criterion();
+    let room = scenes::room(PaperLamps::Eight);
+    let solution = scenes::baked(&room.scene, &scenes::settings(&room, 0.01));
+    codes(&mut criterion, &solution);
+    bytes(&mut criterion, &solution);
+    criterion.final_summary();
+}
+
+fn codes(criterion: &mut Criterion, solution: &Solution) {
+    let values: Vec<f32> = solution
+        .contributions
+        .iter()
+        .flat_map(|value| value.to_array())
+        .collect();
+    let codes: Vec<u8> = values.iter().map(|value| encode(*value)).collect();
+    let table = DecodeTable::new();
+
+    let mut group = criterion.benchmark_group("pack/code");
+    group.throughput(Throughput::Elements(values.len() as u64));
+    group.bench_function("encode", |bencher| {
+        bencher.iter(|| {
+            values
+                .iter()
+                .map(|value| encode(*value))
+                .fold(0, u8::wrapping_add)
+        });
+    });
+    group.bench_function("decode", |bencher| {
+        bencher.iter(|| {
+            black_box(&codes)
+                .iter()
+                .map(|code| table.decode(*code))
+                .sum::<f32>()
+        });
+    });
+    group.finish();
+}
+
+fn bytes(criterion: &mut Criterion, solution: &Solution) {
+    let mut group = criterion.benchmark_group("pack");
+    for code in Code::ALL {
+        let bytes = pack(solution, scenes::format(code)).expect("values in range");
+        group.throughput(Throughput::Bytes(bytes.len() as u64));
+        group.bench_function(format!("pack/{code}"), |bencher| {
+            bencher.iter(|| pack(solution, scenes::format(code)));
+        });
+    }
+
+    for (name, mesh) in [("with mesh", true), ("codes only", false)] {
+        let format = Format {
+            mesh,
+            ..scenes::format(Code::Exp8s)
+        };
+        let bytes = pack(solution, format).expect("values in range");
+        let atlas = Atlas::parse(&bytes).expect("bytes just written");
+        group.throughput(Throughput::Bytes(bytes.len() as u64));
+        group.bench_function(format!("parse/{name}"), |bencher| {
+            bencher.iter(|| Atlas::parse(black_box(&bytes)).expect("bytes just written"));
+        });
+        group.bench_function(format!("unpack/{name}"), |bencher| {
+            bencher.iter(|| unpack(&atlas));
+        });
+    }
+    group.finish();
+}
