@@ -1,7 +1,7 @@
 //! Drawing on a device's display: frames per second of the Cornell box.
 //!
 //! 320 x 240 pixels in RGB565 with a depth buffer for the whole display or for 16 rows of it,
-//! and what comes before: the colour of every element (relight, expose, encode). One thread.
+//! and what comes before it: the colours of all elements, from irradiance to RGB565. One thread.
 
 mod scenes;
 
@@ -20,7 +20,7 @@ use relume::code::Code;
 use relume::color::Rgb;
 use relume::draw::{Camera, Sample, Shown, paint};
 use relume::tone::{Exposure, radiance};
-use relume_host::pack::{pack, relight_atlas};
+use relume_host::pack::pack;
 
 const WIDTH: u32 = 320;
 const HEIGHT: u32 = 240;
@@ -33,17 +33,23 @@ fn main() {
     let atlas = Atlas::parse(&bytes).expect("bytes just written");
     let mesh = atlas.mesh().expect("it was packed with its mesh");
 
-    let mix = solution.nominal_mix();
-    let colors = colors(&atlas, &mesh, &mix);
-    criterion.bench_function("draw/colours of all elements", |bencher| {
-        bencher.iter(|| self::colors(&atlas, &mesh, black_box(&mix)));
-    });
+    let irradiance = solution.relight(&solution.nominal_mix());
+    let colors = colors(&mesh, &irradiance);
+    tone(&mut criterion, &mesh, &irradiance);
     frames(&mut criterion, &mesh, &builtin.camera, &colors);
     criterion.final_summary();
 }
 
-fn colors(atlas: &Atlas, mesh: &AtlasMesh, mix: &[Rgb]) -> Vec<Rgb565> {
-    let irradiance = relight_atlas(atlas, mix).expect("a mix that fits");
+fn tone(criterion: &mut Criterion, mesh: &AtlasMesh, irradiance: &[Rgb]) {
+    let mut group = criterion.benchmark_group("draw");
+    group.throughput(Throughput::Elements(irradiance.len() as u64));
+    group.bench_function("colours of all elements", |bencher| {
+        bencher.iter(|| colors(mesh, black_box(irradiance)));
+    });
+    group.finish();
+}
+
+fn colors(mesh: &AtlasMesh, irradiance: &[Rgb]) -> Vec<Rgb565> {
     let exposure = Exposure::for_white(1.0);
     let colors = irradiance.iter().zip(0..).map(|(irradiance, number)| {
         let element = mesh.element(number).expect("one per element");

@@ -1,7 +1,7 @@
 //! Import: polygons per second from OBJ and glTF files, as counted in the file.
 //!
-//! A generated OBJ of 10 000 quads is always there; the real files are those of the reference data,
-//! left out where that is missing. Files come from the page cache.
+//! A generated OBJ of 10 000 quads, and the same in triangles that have to be put together again; real
+//! files where the reference data is. They come from the page cache.
 
 mod scenes;
 
@@ -18,7 +18,7 @@ use relume_host::import;
 /// Quads along an edge of the generated terrain.
 const SIDE: u32 = 100;
 
-/// Real files: one with many small triangles, one with objects, two binary glTF.
+/// Real files; the last has a texture, which is averaged over its polygons.
 const REAL: [&str; 4] = [
     "scenes/frads_office/scene.obj",
     "scenes/gazebo/scene.obj",
@@ -26,12 +26,22 @@ const REAL: [&str; 4] = [
     "originals/tile-game-room6.glb",
 ];
 
+/// How a generated file says a quad.
+#[derive(Clone, Copy, Debug)]
+enum Face {
+    Quad,
+    Triangles,
+}
+
 fn main() {
     let mut criterion = scenes::criterion();
     let folder = tempfile::tempdir().expect("room for a file");
-    let generated = folder.path().join("terrain.obj");
-    fs::write(&generated, terrain()).expect("room for a file");
-    read(&mut criterion, "generated.obj", &generated);
+    for face in [Face::Quad, Face::Triangles] {
+        let name = format!("{face:?}.obj");
+        let generated = folder.path().join(&name);
+        fs::write(&generated, terrain(face)).expect("room for a file");
+        read(&mut criterion, &format!("generated/{name}"), &generated);
+    }
     for (name, path) in real_files() {
         read(&mut criterion, name, &path);
     }
@@ -58,7 +68,7 @@ fn real_files() -> Vec<(&'static str, PathBuf)> {
 }
 
 /// A grid of quads that steps up and down, so that each is planar.
-fn terrain() -> String {
+fn terrain(face: Face) -> String {
     let mut text = String::new();
     for row in 0..=SIDE {
         for column in 0..=SIDE {
@@ -69,7 +79,14 @@ fn terrain() -> String {
         for column in 1..=SIDE {
             let corner = row * (SIDE + 1) + column;
             let below = corner + SIDE + 1;
-            let _ = writeln!(text, "f {corner} {below} {} {}", below + 1, corner + 1);
+            let (right, opposite) = (corner + 1, below + 1);
+            let _ = match face {
+                Face::Quad => writeln!(text, "f {corner} {below} {opposite} {right}"),
+                Face::Triangles => writeln!(
+                    text,
+                    "f {corner} {below} {opposite}\nf {corner} {opposite} {right}"
+                ),
+            };
         }
     }
     text

@@ -1,8 +1,8 @@
 //! Packing: codes and atlas bytes per second.
 //!
 //! The paper's room with 8 lights, 960 x 8 contributions of three channels: `encode` and `decode`
-//! work on the values alone, in values per second; `pack` adds scales and bytes, `parse` checks
-//! the bytes again (checksum and every value), `unpack` makes a solution of them.
+//! work on single values, spread over the range of the code; `write` adds scales and bytes, `parse`
+//! checks the bytes again (checksum and every value), `unpack` makes a solution of them.
 
 mod scenes;
 
@@ -10,7 +10,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput};
 use relume::atlas::Atlas;
-use relume::code::{Code, DecodeTable, encode};
+use relume::code::{Code, DecodeTable, LARGEST, encode};
 use relume_host::builtin::PaperLamps;
 use relume_host::pack::{Format, pack, unpack};
 use relume_host::solution::Solution;
@@ -19,17 +19,17 @@ fn main() {
     let mut criterion = scenes::criterion();
     let room = scenes::room(PaperLamps::Eight);
     let solution = scenes::baked(&room.scene, &scenes::settings(&room, 0.01));
-    codes(&mut criterion, &solution);
+    codes(&mut criterion);
     bytes(&mut criterion, &solution);
     criterion.final_summary();
 }
 
-fn codes(criterion: &mut Criterion, solution: &Solution) {
-    let values: Vec<f32> = solution
-        .contributions
-        .iter()
-        .flat_map(|value| value.to_array())
-        .collect();
+/// Values of a room of 8 lights.
+const VALUES: u16 = 960 * 8 * 3;
+
+fn codes(criterion: &mut Criterion) {
+    let value = |number: u16| LARGEST * f32::from(number) / f32::from(VALUES);
+    let values: Vec<f32> = (0..VALUES).map(value).collect();
     let codes: Vec<u8> = values.iter().map(|value| encode(*value)).collect();
     let table = DecodeTable::new();
 
@@ -59,7 +59,7 @@ fn bytes(criterion: &mut Criterion, solution: &Solution) {
     for code in Code::ALL {
         let bytes = pack(solution, scenes::format(code)).expect("values in range");
         group.throughput(Throughput::Bytes(bytes.len() as u64));
-        group.bench_function(format!("pack/{code}"), |bencher| {
+        group.bench_function(format!("write/{code}"), |bencher| {
             bencher.iter(|| pack(solution, scenes::format(code)));
         });
     }

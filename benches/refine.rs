@@ -1,7 +1,7 @@
 //! Refinement: what one shot costs per element and light, and what a whole bake costs.
 //!
 //! * `shot`: everything of a shot but its row (checks, reflected shares, distribution), in element
-//!   x light per second: the reciprocal is ns per element and light. Host lanes are 8 wide,
+//!   x light per second: 1 Gelem/s is 1 ns for each of them. Host lanes are 8 wide,
 //!   so one light pays for eight; `1 in one lane` is how a device would hold it. `dark` shots have
 //!   nothing to distribute, so they show what a shot costs before that.
 //! * `bake`: the paper's room as published (100 plain shots) and with kept rows, to the residual

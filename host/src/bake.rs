@@ -100,13 +100,13 @@ pub struct Progress {
 #[non_exhaustive]
 pub enum BakeError {
     /// A tag is out of range.
-    #[error("{0}")]
+    #[error(transparent)]
     Scene(#[from] SceneError),
     /// The scene cannot be divided so.
-    #[error("{0}")]
+    #[error(transparent)]
     Mesh(#[from] MeshError),
     /// The refinement refuses the input.
-    #[error("{0}")]
+    #[error(transparent)]
     Refine(#[from] RefineError),
     /// There is no light.
     #[error("the scene has no light: give a material an emission (Ke), or add one with --lights")]
@@ -140,7 +140,7 @@ pub fn bake(
         return Err(BakeError::NoLight);
     }
     let view = scene.view()?;
-    let spacing = mesh::spacing(&view, settings.patch, settings.element);
+    let spacing = mesh::spacing(&view, settings.patch, settings.element)?;
     let bvh = Bvh::new(&scene.surfaces);
     let mesh = mesh::build(scene, &view, spacing, &bvh)?;
     let mut memory = Memory::new(&mesh, scene.lights.len(), settings)?;

@@ -27,7 +27,9 @@ pub fn max_codes(exact: &[Rgb], found: &[Rgb]) -> f32 {
 pub struct TestMix {
     /// What it is, for people.
     pub name: String,
-    /// One weight per light.
+    /// The first light that may be on; those before it are off.
+    pub first: usize,
+    /// Weights of the lights from there on; those after them are off.
     pub weights: Vec<Rgb>,
 }
 
@@ -39,15 +41,14 @@ pub struct TestMix {
 pub fn test_mixes(nominal: &[Rgb], names: &[&str]) -> Vec<TestMix> {
     let all_on = TestMix {
         name: "all on".to_owned(),
+        first: 0,
         weights: nominal.to_vec(),
     };
-    let solos = names.iter().enumerate().map(|(light, name)| {
-        let mut weights = vec![Rgb::BLACK; nominal.len()];
-        weights[light] = nominal[light];
-        TestMix {
-            name: format!("{name} alone"),
-            weights,
-        }
+    let solos = names.iter().zip(nominal).enumerate();
+    let solos = solos.map(|(light, (name, emission))| TestMix {
+        name: format!("{name} alone"),
+        first: light,
+        weights: vec![*emission],
     });
     let dimmings = (0..64_u64).map(|state| {
         let weights = nominal.iter().zip(0_u64..).map(|(emission, light)| {
@@ -61,6 +62,7 @@ pub fn test_mixes(nominal: &[Rgb], names: &[&str]) -> Vec<TestMix> {
         });
         TestMix {
             name: format!("dimming {state}"),
+            first: 0,
             weights: weights.collect(),
         }
     });
@@ -95,7 +97,10 @@ mod tests {
     fn mixes_cover_all_solos_and_dimmings() {
         let mixes = test_mixes(&[Rgb::WHITE, Rgb::splat(2.0)], &["a", "b"]);
         assert_eq!(mixes.len(), 1 + 2 + 64);
-        assert_eq!(mixes[2].weights, [Rgb::BLACK, Rgb::splat(2.0)]);
+        assert_eq!(
+            (mixes[2].first, &*mixes[2].weights),
+            (1, &[Rgb::splat(2.0)][..])
+        );
         assert!(
             mixes
                 .iter()

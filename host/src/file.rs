@@ -33,7 +33,10 @@ fn replace(target: &Path, bytes: &[u8]) -> io::Result<()> {
         .parent()
         .filter(|parent| !parent.as_os_str().is_empty())
         .unwrap_or(Path::new("."));
-    let mut temporary = builder().tempfile_in(folder)?;
+    fs::metadata(folder)?;
+    // The kind alone: nobody asked for the temporary name that the error would bring along.
+    let unnamed = |error: io::Error| io::Error::from(error.kind());
+    let mut temporary = builder().tempfile_in(folder).map_err(unnamed)?;
     temporary.write_all(bytes)?;
     temporary.persist(target)?;
     Ok(())

@@ -8,7 +8,7 @@ use relume::mesh::{Element, Face, Patch, Spacing};
 use relume::relight::{RelightError, float_weights, relight};
 use thiserror::Error;
 
-use crate::display_error::{TestMix, max_codes, test_mixes};
+use crate::display_error::{max_codes, test_mixes};
 use crate::mesh::OwnedMesh;
 use crate::picture::white;
 use crate::solution::{Solution, SolutionLight};
@@ -31,7 +31,7 @@ pub struct Format {
 #[non_exhaustive]
 pub enum PackError {
     /// The atlas refused.
-    #[error("{0}")]
+    #[error(transparent)]
     Atlas(#[from] AtlasError),
     /// A contribution or emission of this light cannot be scaled.
     #[error("light `{0}`: its values leave the range that can be packed")]
@@ -248,27 +248,40 @@ pub fn packing_error(solution: &Solution, atlas: &Atlas) -> Result<PackingError,
         codes_shown: 0.0,
         per_light: Vec::new(),
     };
-    for (TestMix { name, weights }, number) in test_mixes(&solution.nominal_mix(), &names)
+    let decoded = unpack(atlas).contributions;
+    let mut all = vec![Rgb::BLACK; lights];
+    for (state, number) in test_mixes(&solution.nominal_mix(), &names)
         .into_iter()
         .zip(0..)
     {
-        let exact: Vec<Rgb> = values
-            .chunks(lights.max(1))
-            .map(|values| {
-                let weighted = values.iter().zip(&weights);
-                weighted.fold(Rgb::BLACK, |sum, (value, weight)| sum + *value * *weight)
-            })
-            .collect();
-        let found = relight_atlas(atlas, &weights)?;
+        let range = state.first..state.first + state.weights.len();
+        let relit = |values: &[Rgb]| -> Vec<Rgb> {
+            values
+                .chunks(lights.max(1))
+                .map(|values| {
+                    let weighted = values[range.clone()].iter().zip(&state.weights);
+                    weighted.fold(Rgb::BLACK, |sum, (value, weight)| sum + *value * *weight)
+                })
+                .collect()
+        };
+        let exact = relit(&values);
+        // One light alone needs no kernel, which would read the codes of all the others.
+        let found = if state.weights.len() == lights {
+            relight_atlas(atlas, &state.weights)?
+        } else {
+            relit(&decoded)
+        };
         let codes = max_codes(&exact, &found);
-        let exitance = solution.face_exitance(&weights);
+        all[range.clone()].copy_from_slice(&state.weights);
+        let exitance = solution.face_exitance(&all);
+        all[range].fill(Rgb::BLACK);
         let shown = |state: &[Rgb]| shown(solution, atlas.quantity(), state, &exitance);
         worst.codes_shown = worst
             .codes_shown
             .max(max_codes(&shown(&exact), &shown(&found)));
         if codes > worst.codes || worst.worst_state.is_empty() {
             worst.codes = codes;
-            worst.worst_state = name;
+            worst.worst_state = state.name;
         }
         if (1..=lights).contains(&number) {
             worst.per_light.push(codes);

@@ -57,7 +57,7 @@ pub enum ProbeError {
     #[error("direct light was not kept apart; bake with --split-direct")]
     NoDirect,
     /// Writing failed.
-    #[error("{0}")]
+    #[error(transparent)]
     Io(#[from] io::Error),
 }
 

@@ -10,7 +10,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
-use super::{Outcome, human_bytes, output_path, write_file};
+use super::{Outcome, human_bytes, output_path, tell, write_file};
 use crate::bake::{Method, Progress, Settings, bake};
 use crate::import;
 use crate::scene::OwnedScene;
@@ -29,7 +29,7 @@ pub struct Arguments {
     /// Longest edge of a patch, in the file's units [default: four elements]
     #[arg(long, value_name = "LENGTH", value_parser = positive)]
     patch: Option<f32>,
-    /// Longest edge of an element [default: sqrt(reflecting area / 8000)]
+    /// Longest edge of an element [default: sqrt(reflecting area / 8000), longer where polygons are many]
     #[arg(long, value_name = "LENGTH", value_parser = positive)]
     element: Option<f32>,
     /// Stop when every light has at most this share of its power left to distribute
@@ -92,7 +92,7 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     );
     let imported = import::load(&arguments.scene, arguments.lights.as_deref())?;
     for line in imported.repairs.lines() {
-        eprintln!("{path}: {line}");
+        tell!("{path}: {line}");
     }
 
     let mut pool = rayon::ThreadPoolBuilder::new();
@@ -120,7 +120,8 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
             "faces": solution.mesh.faces.len(),
             "patches": solution.mesh.patches.len(),
             "elements": solution.mesh.elements.len(),
-            "lights": lights.collect::<Vec<_>>(),
+            "lights": solution.lights.len(),
+            "per_light": lights.collect::<Vec<_>>(),
             "patch": solution.spacing.patch,
             "element": solution.spacing.element,
             "shots": solution.rows,
@@ -188,9 +189,9 @@ pub fn watched(scene: &OwnedScene, settings: &Settings) -> Result<Baked> {
 fn report(baked: &Baked, file: &str, bytes: usize) {
     let solution = &baked.solution;
     if baked.interrupted {
-        eprintln!("interrupted: this is what --shots {} gives", solution.rows);
+        tell!("interrupted: this is what --shots {} gives", solution.rows);
     }
-    eprintln!(
+    tell!(
         "{file}: {} elements, {} patches, {} lights, {} rows, residual {:.2e}, {:.2} s, {}",
         solution.mesh.elements.len(),
         solution.mesh.patches.len(),

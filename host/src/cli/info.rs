@@ -8,7 +8,7 @@ use relume::atlas::{Atlas, Quantity};
 use serde_json::{Value, json};
 
 use super::load::{Loaded, load};
-use super::{Outcome, human_bytes};
+use super::{Outcome, human_bytes, tell};
 use crate::solution::{self, Solution};
 
 #[derive(Debug, Args)]
@@ -22,7 +22,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome> {
         Loaded::Solution(solution) => of_solution(&solution),
         Loaded::Atlas { bytes, .. } => of_atlas(&Atlas::parse(&bytes)?, bytes.len()),
     };
-    eprintln!("{}:", arguments.input.display());
+    tell!("{}:", arguments.input.display());
     print_lines(&report);
     Ok(Outcome::done(report))
 }
@@ -46,7 +46,8 @@ fn of_solution(solution: &Solution) -> Value {
         "element": solution.spacing.element,
         "shots": solution.rows,
         "split_direct": solution.direct.is_some(),
-        "lights": lights.collect::<Vec<_>>(),
+        "lights": solution.lights.len(),
+        "per_light": lights.collect::<Vec<_>>(),
     })
 }
 
@@ -80,7 +81,8 @@ fn of_atlas(atlas: &Atlas, bytes: usize) -> Value {
         "ram": n * 12 + k * 6,
         "multiply_adds_per_frame": n * k * 3,
         "multiply_adds_per_changed_light": n * 3,
-        "lights": lights.collect::<Vec<_>>(),
+        "lights": k,
+        "per_light": lights.collect::<Vec<_>>(),
     })
 }
 
@@ -89,14 +91,14 @@ fn print_lines(report: &Value) {
     for (key, value) in report.as_object().into_iter().flatten() {
         match value {
             Value::Array(entries) => {
-                eprintln!("  {key}:");
-                entries.iter().for_each(|entry| eprintln!("    {entry}"));
+                tell!("  {key}:");
+                entries.iter().for_each(|entry| tell!("    {entry}"));
             }
             Value::Number(number) if key == "flash" || key == "ram" || key.ends_with("bytes") => {
                 let bytes = number.as_u64().unwrap_or(0) as usize;
-                eprintln!("  {key}: {}", human_bytes(bytes));
+                tell!("  {key}: {}", human_bytes(bytes));
             }
-            other => eprintln!("  {key}: {other}"),
+            other => tell!("  {key}: {other}"),
         }
     }
 }

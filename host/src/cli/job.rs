@@ -14,7 +14,7 @@ use tiny_skia::Pixmap;
 
 use super::bake::{Baked, watched};
 use super::relight::BACKGROUND;
-use super::{Outcome, human_bytes, write_file};
+use super::{Outcome, human_bytes, tell, write_file};
 use crate::bake::Settings;
 use crate::builtin::{Builtin, cornell_box};
 use crate::display_error::max_codes;
@@ -168,8 +168,8 @@ pub fn run() -> Result<Outcome> {
         solution_bytes.len(),
     );
     folder.write("report.txt", report.as_bytes())?;
-    eprint!("{report}");
-    eprintln!(
+    tell!("{}", report.trim_end());
+    tell!(
         "{FOLDER}/ holds {} files; see {FOLDER}/overview.png",
         folder.0.len()
     );

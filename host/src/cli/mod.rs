@@ -75,21 +75,41 @@ pub fn run() -> ExitCode {
         Some(Command::Probe(arguments)) => probe::run(&arguments, cli.json),
         Some(Command::Info(arguments)) => info::run(&arguments),
     };
-    match outcome {
-        Ok(outcome) => {
-            if cli.json {
-                println!("{}", outcome.report);
-            }
-            ExitCode::from(if outcome.interrupted { 130 } else { 0 })
+    let written = outcome.and_then(|outcome| {
+        if cli.json {
+            write_file(Path::new("-"), format!("{}\n", outcome.report).as_bytes())?;
         }
+        Ok(outcome.interrupted)
+    });
+    match written {
+        Ok(interrupted) => ExitCode::from(if interrupted { 130 } else { 0 }),
         Err(error) => {
-            // One line, whatever the message came with.
-            let message = format!("{error:#}").replace('\n', " ");
-            eprintln!("relume: {message}");
+            tell!("relume: {}", one_line(&error));
             ExitCode::FAILURE
         }
     }
 }
+
+/// The error and its causes on one line; a cause that is told already is not told again.
+fn one_line(error: &anyhow::Error) -> String {
+    let mut line = String::new();
+    for cause in error.chain().map(ToString::to_string) {
+        if !line.contains(&cause) {
+            let separator = if line.is_empty() { "" } else { ": " };
+            line = line + separator + &cause;
+        }
+    }
+    line.replace('\n', " ")
+}
+
+/// A line for people, on stderr. That nobody can read it (a closed pipe) does not end the work.
+macro_rules! tell {
+    ($($text:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stderr(), $($text)*);
+    }};
+}
+use tell;
 
 /// The output path: as given, or the input's name with another extension, in this folder.
 ///

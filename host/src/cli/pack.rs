@@ -9,7 +9,7 @@ use relume::code::Code;
 use serde_json::json;
 
 use super::load::{Loaded, load};
-use super::{Outcome, human_bytes, output_path, write_file};
+use super::{Outcome, human_bytes, output_path, tell, write_file};
 use crate::pack::{Format, pack, packing_error};
 
 #[derive(Debug, Args)]
@@ -63,7 +63,7 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     let atlas = Atlas::parse(&bytes)?;
     let error = packing_error(&solution, &atlas)?;
     write_file(&output, &bytes)?;
-    eprintln!(
+    tell!(
         "{}: {}, {} for {} codes, error at most {:.2} display codes ({}), {:.2} as shown",
         output.display(),
         format.code,

@@ -7,7 +7,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::load::{Loaded, load, read};
-use super::{Outcome, output_path, write_file};
+use super::{Outcome, output_path, tell, write_file};
 use crate::probe::{Part, ProbeError, Probed, probe_elements, probe_points, read_points};
 
 #[derive(Debug, Args)]
@@ -56,7 +56,7 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
         }
     };
     if probed.missing > 0 {
-        eprintln!(
+        tell!(
             "{} points lie on no surface that stores light; their rows are nan",
             probed.missing
         );

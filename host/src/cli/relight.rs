@@ -9,7 +9,7 @@ use relume::color::Rgb;
 use serde_json::json;
 
 use super::load::{Loaded, load};
-use super::{Outcome, output_path, write_file};
+use super::{Outcome, output_path, tell, write_file};
 use crate::export::exr;
 use crate::mesh::OwnedMesh;
 use crate::mix::{Setting, mix};
@@ -134,7 +134,7 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     };
     write_file(&output, &bytes)?;
     let exposed = exposure.map_or("linear, unexposed".to_owned(), |e| format!("exposure {e}"));
-    eprintln!("{}: {width}x{height}, {exposed}", output.display());
+    tell!("{}: {width}x{height}, {exposed}", output.display());
     Ok(Outcome::done(json!({
         "file": output,
         "width": width,

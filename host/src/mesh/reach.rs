@@ -1,11 +1,12 @@
 //! Which faces light reaches, directly or by any number of bounces.
 //!
-//! Every face casts 64 rays for each patch-sized part of it. A face is reached when a part of it
-//! receives direct light from a lamp or luminaire, or exchanges a ray, in either direction, with a
-//! face that is reached. Assumption: a face that light reaches only through an opening that none
-//! of these rays finds carries too little of it to matter.
+//! Every face casts 64 rays for each patch-sized part of it, or part of the default patch's size
+//! where that is larger: finer patches are no reason to look closer. A face is reached when a part
+//! of it receives direct light from a lamp or luminaire, or exchanges a ray, in either direction,
+//! with a face that is reached. Assumption: a face that light reaches only through an opening that
+//! none of these rays finds carries too little of it to matter.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::f32::consts::TAU;
 
 use glam::Vec3;
@@ -53,9 +54,10 @@ pub fn reached_faces(
     bvh: &Bvh,
 ) -> Result<ReachedFaces, MeshError> {
     let mut parts = OwnedMesh::default();
+    let length = spacing.patch.max(super::spacing(scene, None, None)?.patch);
     let coarse = Spacing {
-        element: spacing.patch,
-        ..spacing
+        patch: length,
+        element: length,
     };
     subdivide(scene, coarse, |_, _| true, &mut parts)?;
     let mesh = parts.view();
@@ -81,7 +83,7 @@ pub fn reached_faces(
 }
 
 /// For every face, the faces with which it exchanged a ray.
-fn exchanges(mesh: &Mesh, scene: &Scene, bvh: &Bvh) -> Vec<Vec<usize>> {
+fn exchanges(mesh: &Mesh, scene: &Scene, bvh: &Bvh) -> Vec<BTreeSet<usize>> {
     let numbers: HashMap<(u32, Side), usize> = mesh
         .faces
         .iter()
@@ -89,7 +91,7 @@ fn exchanges(mesh: &Mesh, scene: &Scene, bvh: &Bvh) -> Vec<Vec<usize>> {
         .map(|(number, face)| ((face.surface, face.side), number))
         .collect();
     let far = luminaire::far(scene);
-    let mut exchanges = vec![Vec::new(); mesh.faces.len()];
+    let mut exchanges = vec![BTreeSet::new(); mesh.faces.len()];
     for (patch, polygon) in patch_polygons(mesh) {
         for ray in rays(&polygon) {
             let Some(Hit { surface, front, .. }) = bvh.nearest(ray.0, ray.0 + ray.1 * far) else {
@@ -98,14 +100,10 @@ fn exchanges(mesh: &Mesh, scene: &Scene, bvh: &Bvh) -> Vec<Vec<usize>> {
             let side = if front { Side::Front } else { Side::Back };
             if let Some(&other) = numbers.get(&(surface, side)) {
                 let face = patch.face as usize;
-                exchanges[face].push(other);
-                exchanges[other].push(face);
+                exchanges[face].insert(other);
+                exchanges[other].insert(face);
             }
         }
-    }
-    for list in &mut exchanges {
-        list.sort_unstable();
-        list.dedup();
     }
     exchanges
 }
