@@ -23,7 +23,7 @@ use relume_host::scene::OwnedScene;
 use relume_host::solution::Solution;
 
 /// How often both sides of a comparison are taken; the fastest of each counts.
-const TURNS: usize = 3;
+const TURNS: usize = 5;
 
 fn main() {
     let mut criterion = scenes::criterion();

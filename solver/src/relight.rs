@@ -14,6 +14,7 @@
 //! from its table), which [`FixedMix::error_bound`] sums up.
 
 use core::fmt;
+use core::num::NonZeroUsize;
 
 use crate::atlas::{Atlas, Channels};
 use crate::code::{DECODED_BITS, DecodeTable, SATURATED, decode_fixed};
@@ -88,24 +89,37 @@ pub fn relight(
 ) -> Result<(), RelightError> {
     check_lights(atlas, weights.len())?;
     check_elements(atlas, irradiance.len())?;
-    for (sum, element) in irradiance.iter_mut().zip(0..) {
-        *sum = Rgb::BLACK;
-        for (weight, codes) in weights.iter().zip(contributions(atlas, element)) {
-            *sum += *weight * Rgb::from_array(codes.map(|code| table.decode(code)));
-        }
+    irradiance.fill(Rgb::BLACK);
+    match atlas.channels() {
+        Channels::Rgb => for_each_element(atlas, irradiance, |sum, codes| {
+            for (weight, codes) in weights.iter().zip(triples(codes)) {
+                *sum += *weight * Rgb::from_array(codes.map(|code| table.decode(code)));
+            }
+        }),
+        Channels::Luminance => for_each_element(atlas, irradiance, |sum, codes| {
+            for (weight, code) in weights.iter().zip(codes) {
+                *sum += *weight * table.decode(*code);
+            }
+        }),
     }
     Ok(())
 }
 
-/// The three codes of each light at one element; a luminance stands three times.
-fn contributions<'a>(atlas: &Atlas<'a>, element: u32) -> impl Iterator<Item = [u8; 3]> + use<'a> {
-    let codes = atlas.codes(element);
-    let (triples, singles): (&[[u8; 3]], &[u8]) = match atlas.channels() {
-        Channels::Rgb => (codes.as_chunks().0, &[]),
-        Channels::Luminance => (&[], codes),
+/// Calls `f` with the output and the codes of every element; nothing happens without lights.
+fn for_each_element<T>(atlas: &Atlas, output: &mut [T], mut f: impl FnMut(&mut T, &[u8])) {
+    let length = atlas.light_count() as usize * atlas.channels().count();
+    let Some(length) = NonZeroUsize::new(length) else {
+        return;
     };
-    let singles = singles.iter().map(|code| [*code; 3]);
-    triples.iter().copied().chain(singles)
+    let rows = atlas.all_codes().chunks_exact(length.get());
+    for (output, codes) in output.iter_mut().zip(rows) {
+        f(output, codes);
+    }
+}
+
+/// The codes of an element as red, green and blue of every light.
+const fn triples(codes: &[u8]) -> &[[u8; 3]] {
+    codes.as_chunks().0
 }
 
 /// A mix in fixed point: a `u16` weight per light and channel, and the power of two of them all.
@@ -234,11 +248,18 @@ pub fn relight_fixed(
 ) -> Result<(), RelightError> {
     check_lights(atlas, mix.weights.len())?;
     check_elements(atlas, sums.len())?;
-    for (sum, element) in sums.iter_mut().zip(0..) {
-        *sum = [0; 3];
-        for (weight, codes) in mix.weights.iter().zip(contributions(atlas, element)) {
-            accumulate(sum, codes, weight.map(u32::from));
-        }
+    sums.fill([0; 3]);
+    match atlas.channels() {
+        Channels::Rgb => for_each_element(atlas, sums, |sum, codes| {
+            for (weight, codes) in mix.weights.iter().zip(triples(codes)) {
+                accumulate(sum, *codes, weight.map(u32::from));
+            }
+        }),
+        Channels::Luminance => for_each_element(atlas, sums, |sum, codes| {
+            for (weight, code) in mix.weights.iter().zip(codes) {
+                accumulate(sum, [*code; 3], weight.map(u32::from));
+            }
+        }),
     }
     Ok(())
 }
@@ -264,11 +285,16 @@ pub fn change_fixed(
     let [ar, ag, ab] = after;
     let difference =
         [(ar, r), (ag, g), (ab, b)].map(|(a, b)| u32::from(a).wrapping_sub(u32::from(b)));
-    for (sum, element) in sums.iter_mut().zip(0..) {
-        if let Some(codes) = contributions(atlas, element).nth(light as usize) {
+    let light = light as usize;
+    for_each_element(atlas, sums, |sum, codes| {
+        let codes = match atlas.channels() {
+            Channels::Rgb => triples(codes).get(light).copied(),
+            Channels::Luminance => codes.get(light).map(|code| [*code; 3]),
+        };
+        if let Some(codes) = codes {
             accumulate(sum, codes, difference);
         }
-    }
+    });
     Ok(())
 }
 

@@ -63,7 +63,10 @@ impl Folder {
     /// Runs the program with `--json`: stdout must be one object and stderr for people.
     pub fn json(&self, arguments: &[&str]) -> Value {
         let (stdout, stderr) = self.told(&[arguments, &["--json"]].concat());
-        assert!(!stderr.trim().is_empty(), "{arguments:?}: nothing for people");
+        assert!(
+            !stderr.trim().is_empty(),
+            "{arguments:?}: nothing for people"
+        );
         assert!(!stderr.trim_start().starts_with('{'), "{stderr}");
         one_object(&stdout)
     }
@@ -76,7 +79,10 @@ impl Folder {
         assert_eq!(code, Some(1), "{arguments:?}: {stderr}");
         assert!(output.stdout.is_empty(), "{arguments:?} wrote to stdout");
         let line = stderr.strip_suffix('\n').expect("a whole line");
-        assert!(!line.contains('\n'), "{arguments:?}: more than one line: {stderr}");
+        assert!(
+            !line.contains('\n'),
+            "{arguments:?}: more than one line: {stderr}"
+        );
         assert!(line.starts_with("relume: "), "{arguments:?}: {line}");
         assert!(self.files() == before, "{arguments:?} touched files");
         line.to_owned()
