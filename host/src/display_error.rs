@@ -8,6 +8,7 @@
 use relume::color::Rgb;
 use relume::tone::{Exposure, srgb_encode};
 
+use crate::noise;
 use crate::picture::white;
 
 /// Largest difference between two states, in display codes.
@@ -52,7 +53,7 @@ pub fn test_mixes(nominal: &[Rgb], names: &[&str]) -> Vec<TestMix> {
     });
     let dimmings = (0..64_u64).map(|state| {
         let weights = nominal.iter().zip(0_u64..).map(|(emission, light)| {
-            let noise = unit_noise(state << 32 | light);
+            let noise = noise::unit(state << 32 | light);
             *emission
                 * match state % 3 {
                     0 => noise,
@@ -70,14 +71,6 @@ pub fn test_mixes(nominal: &[Rgb], names: &[&str]) -> Vec<TestMix> {
         .chain(solos)
         .chain(dimmings)
         .collect()
-}
-
-/// A number in [0, 1) for every seed: SplitMix64 (Steele, Lea and Flood 2014), top 24 bits.
-fn unit_noise(seed: u64) -> f32 {
-    let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 40) as f32 / (1_u32 << 24) as f32
 }
 
 #[cfg(test)]

@@ -4,6 +4,8 @@
 
 pub mod file;
 
+pub mod noise;
+
 pub mod texture;
 
 pub mod scene;

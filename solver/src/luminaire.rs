@@ -46,6 +46,25 @@ pub fn irradiance(
         .sum()
 }
 
+/// Irradiance at a point with a unit normal at unit emission, W/m2.
+///
+/// `far` is a distance at which every surface has been passed, in m.
+#[must_use]
+pub fn at_point(
+    source: &Source,
+    position: Vec3,
+    normal: Vec3,
+    far: f32,
+    visibility: &impl Visibility,
+) -> f32 {
+    let receiver = Receiver {
+        position,
+        normal,
+        rotation: 0.0,
+    };
+    receiver.irradiance(source, far, visibility)
+}
+
 /// A point that receives, and by how much its directions are turned against its neighbours'.
 struct Receiver {
     position: Vec3,

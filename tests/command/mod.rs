@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 
 use serde_json::Value;
 use tempfile::TempDir;
@@ -35,67 +35,63 @@ impl Folder {
         files
     }
 
-    pub fn command(&self, arguments: &[&str]) -> Command {
+    /// The program with its arguments, which are separated by spaces.
+    pub fn command(&self, arguments: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_relume"));
-        command.current_dir(self.path()).args(arguments);
+        command.current_dir(self.path());
+        command.args(arguments.split_whitespace());
         command
     }
 
-    fn run(&self, arguments: &[&str]) -> (Option<i32>, Output, String) {
+    /// Exit code, stdout and stderr; a panic is never right.
+    fn run(&self, arguments: &str) -> (Option<i32>, Vec<u8>, String) {
         let output = self.command(arguments).output().expect("relume starts");
-        let stderr = String::from_utf8(output.stderr.clone()).expect("UTF-8 on stderr");
-        assert!(!stderr.contains("panicked"), "{arguments:?}: {stderr}");
-        (output.status.code(), output, stderr)
+        let stderr = String::from_utf8(output.stderr).expect("UTF-8 on stderr");
+        assert!(!stderr.contains("panicked"), "{arguments}: {stderr}");
+        (output.status.code(), output.stdout, stderr)
     }
 
     /// Runs the program, which must succeed; returns stdout and stderr.
-    pub fn told(&self, arguments: &[&str]) -> (Vec<u8>, String) {
-        let (code, output, stderr) = self.run(arguments);
-        assert_eq!(code, Some(0), "{arguments:?}: {stderr}");
-        (output.stdout, stderr)
+    pub fn told(&self, arguments: &str) -> (Vec<u8>, String) {
+        let (code, stdout, stderr) = self.run(arguments);
+        assert_eq!(code, Some(0), "{arguments}: {stderr}");
+        (stdout, stderr)
     }
 
     /// Runs the program, which must succeed; returns stdout.
-    pub fn done(&self, arguments: &[&str]) -> Vec<u8> {
+    pub fn done(&self, arguments: &str) -> Vec<u8> {
         self.told(arguments).0
     }
 
-    /// Runs the program with `--json`: stdout must be one object and stderr for people.
-    pub fn json(&self, arguments: &[&str]) -> Value {
-        let (stdout, stderr) = self.told(&[arguments, &["--json"]].concat());
-        assert!(
-            !stderr.trim().is_empty(),
-            "{arguments:?}: nothing for people"
-        );
+    /// Runs the program with `--json`: stdout must be one object, and stderr for people.
+    pub fn json(&self, arguments: &str) -> Value {
+        let (stdout, stderr) = self.told(&format!("{arguments} --json"));
         assert!(!stderr.trim_start().starts_with('{'), "{stderr}");
         one_object(&stdout)
     }
 
     /// Runs the program, which must refuse its input: exit 1, one line on stderr that is returned,
     /// nothing on stdout, and no file made, changed or left behind.
-    pub fn refused(&self, arguments: &[&str]) -> String {
+    pub fn refused(&self, arguments: &str) -> String {
         let before = self.files();
-        let (code, output, stderr) = self.run(arguments);
-        assert_eq!(code, Some(1), "{arguments:?}: {stderr}");
-        assert!(output.stdout.is_empty(), "{arguments:?} wrote to stdout");
+        let (code, stdout, stderr) = self.run(arguments);
+        assert_eq!(code, Some(1), "{arguments}: {stderr}");
+        assert!(stdout.is_empty(), "{arguments}: wrote to stdout");
         let line = stderr.strip_suffix('\n').expect("a whole line");
-        assert!(
-            !line.contains('\n'),
-            "{arguments:?}: more than one line: {stderr}"
-        );
-        assert!(line.starts_with("relume: "), "{arguments:?}: {line}");
-        assert!(self.files() == before, "{arguments:?} touched files");
+        assert!(!line.contains('\n'), "{arguments}: {stderr}");
+        assert!(line.starts_with("relume: "), "{arguments}: {line}");
+        assert!(self.files() == before, "{arguments}: touched files");
         line.to_owned()
     }
 
     /// Runs the program, which must find itself wrongly used: exit 2, nothing done.
-    pub fn misused(&self, arguments: &[&str]) -> String {
+    pub fn misused(&self, arguments: &str) -> String {
         let before = self.files();
-        let (code, output, stderr) = self.run(arguments);
-        assert_eq!(code, Some(2), "{arguments:?}: {stderr}");
-        assert!(output.stdout.is_empty(), "{arguments:?} wrote to stdout");
-        assert!(stderr.starts_with("error: "), "{arguments:?}: {stderr}");
-        assert!(self.files() == before, "{arguments:?} touched files");
+        let (code, stdout, stderr) = self.run(arguments);
+        assert_eq!(code, Some(2), "{arguments}: {stderr}");
+        assert!(stdout.is_empty(), "{arguments}: wrote to stdout");
+        assert!(stderr.starts_with("error: "), "{arguments}: {stderr}");
+        assert!(self.files() == before, "{arguments}: touched files");
         stderr
     }
 }

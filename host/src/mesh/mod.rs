@@ -14,7 +14,7 @@ use crate::scene::OwnedScene;
 const DEFAULT_ELEMENTS: f32 = 8000.0;
 
 /// Elements, both sides counted, above which the default spacing gives way.
-const MOST_DEFAULT_ELEMENTS: u32 = 24_000;
+const MOST_DEFAULT_ELEMENTS: u32 = 40_000;
 
 /// Elements along the edge of a patch, by default.
 const ELEMENTS_PER_PATCH_EDGE: f32 = 4.0;
@@ -77,7 +77,7 @@ impl MeshSink for OwnedMesh {
 ///
 /// Elements: an edge of `sqrt(A / 8000)`, with `A` the area of all reflecting surfaces, one side
 /// each, so that 8000 squares would cover them; slender triangles and small polygons make it more,
-/// so while there are over 24 000, both sides counted, the edge is lengthened by `sqrt 2`, as long as
+/// so while there are over 40 000, both sides counted, the edge is lengthened by `sqrt 2`, as long as
 /// that saves a tenth of them. Patches: four elements long.
 ///
 /// # Errors

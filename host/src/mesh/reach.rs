@@ -1,29 +1,34 @@
 //! Which faces light reaches, directly or by any number of bounces.
 //!
-//! Every face casts 64 rays for each patch-sized part of it, or part of the default patch's size
-//! where that is larger: finer patches are no reason to look closer. A face is reached when a part
-//! of it receives direct light from a lamp or luminaire, or exchanges a ray, in either direction,
-//! with a face that is reached. Assumption: a face that light reaches only through an opening that
-//! none of these rays finds carries too little of it to matter.
+//! A face is reached when it emits, when a part of it receives direct light, or when a walk from
+//! it, ray by ray from surface to surface, comes to a point that does. Walks go through points, not
+//! parts, so a floor that is lit around a closed box does not light the inside of the box. Each
+//! part, as large as a patch or the default patch, whichever is larger, starts 32 walks of up to 16
+//! rays. Assumption: a face that all of them miss gets too little light to matter.
 
-use std::collections::{BTreeSet, HashMap};
 use std::f32::consts::TAU;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
 use relume::form_factor::Shooter;
-use relume::geometry::{Polygon, gauss_points};
+use relume::geometry::{Polygon, from_unit_square, gauss_points};
 use relume::luminaire;
-use relume::mesh::{Mesh, MeshError, Patch, Side, Spacing, subdivide};
+use relume::mesh::{Mesh, MeshError, Side, Spacing, is_face, subdivide};
 use relume::scene::Scene;
+use relume::visibility::Visibility;
 
 use super::OwnedMesh;
 use crate::bvh::{Bvh, Hit};
+use crate::noise;
 
-/// Rays from each of the four points of a part.
-const RAYS_PER_POINT: u32 = 16;
+/// Walks that start at each part.
+const WALKS: u64 = 32;
 
-/// Golden ratio: its multiples spread evenly over a circle.
-const GOLDEN: f32 = 1.618_034;
+/// Rays of a walk.
+const LONGEST_WALK: u64 = 16;
+
+/// Points of lamps that a point on a walk looks at.
+const GLANCES: u64 = 4;
 
 /// The sides of surfaces that light reaches.
 #[derive(Debug)]
@@ -61,100 +66,130 @@ pub fn reached_faces(
     };
     subdivide(scene, coarse, |_, _| true, &mut parts)?;
     let mesh = parts.view();
-    let exchange = exchanges(&mesh, scene, bvh);
-    let mut reached = lit_directly(&mesh, scene, bvh);
-
-    // Spread along the exchanged rays until nothing changes.
-    let mut waiting: Vec<usize> = (0..reached.len()).filter(|face| reached[*face]).collect();
-    while let Some(face) = waiting.pop() {
-        for &other in &exchange[face] {
-            if !reached[other] {
-                reached[other] = true;
-                waiting.push(other);
-            }
-        }
-    }
+    let surroundings = Surroundings::new(&mesh, scene, bvh);
 
     let mut sides = vec![[false; 2]; scene.surfaces().len()];
-    for (face, reached) in mesh.faces.iter().zip(reached) {
-        sides[face.surface as usize][side_index(face.side)] = reached;
+    let reached: Vec<bool> = (0..mesh.patches.len())
+        .into_par_iter()
+        .map(|part| surroundings.reaches(&mesh, part as u32))
+        .collect();
+    for (part, reached) in mesh.patches.iter().zip(reached) {
+        let face = &mesh.faces[part.face as usize];
+        sides[face.surface as usize][side_index(face.side)] |= reached || face.emission.is_some();
     }
     Ok(ReachedFaces(sides))
 }
 
-/// For every face, the faces with which it exchanged a ray.
-fn exchanges(mesh: &Mesh, scene: &Scene, bvh: &Bvh) -> Vec<BTreeSet<usize>> {
-    let numbers: HashMap<(u32, Side), usize> = mesh
-        .faces
-        .iter()
-        .enumerate()
-        .map(|(number, face)| ((face.surface, face.side), number))
-        .collect();
-    let far = luminaire::far(scene);
-    let mut exchanges = vec![BTreeSet::new(); mesh.faces.len()];
-    for (patch, polygon) in patch_polygons(mesh) {
-        for ray in rays(&polygon) {
-            let Some(Hit { surface, front, .. }) = bvh.nearest(ray.0, ray.0 + ray.1 * far) else {
-                continue;
-            };
-            let side = if front { Side::Front } else { Side::Back };
-            if let Some(&other) = numbers.get(&(surface, side)) {
-                let face = patch.face as usize;
-                exchanges[face].insert(other);
-                exchanges[other].insert(face);
-            }
+/// A point on a side of a surface.
+#[derive(Clone, Copy)]
+struct Place {
+    position: Vec3,
+    normal: Vec3,
+}
+
+/// A scene as a walker sees it.
+struct Surroundings<'a> {
+    scene: &'a Scene<'a>,
+    bvh: &'a Bvh,
+    lamps: Vec<Polygon>,
+    shooters: Vec<Shooter>,
+    far: f32,
+}
+
+impl<'a> Surroundings<'a> {
+    fn new(mesh: &Mesh, scene: &'a Scene<'a>, bvh: &'a Bvh) -> Self {
+        let emits = |part: &u32| mesh.patch_emission(*part).is_some();
+        let lamps: Vec<Polygon> = (0..mesh.patches.len() as u32)
+            .filter(emits)
+            .filter_map(|part| mesh.patch_polygon(part))
+            .collect();
+        Self {
+            scene,
+            bvh,
+            shooters: lamps.iter().map(|lamp| Shooter::new(*lamp)).collect(),
+            lamps,
+            far: luminaire::far(scene),
         }
     }
-    exchanges
-}
 
-fn patch_polygons<'a>(mesh: &'a Mesh) -> impl Iterator<Item = (&'a Patch, Polygon)> {
-    let outlines = (0..).map(|patch| mesh.patch_polygon(patch));
-    mesh.patches
-        .iter()
-        .zip(outlines)
-        .filter_map(|(patch, polygon)| Some((patch, polygon?)))
-}
+    /// True when light comes to a part, directly or along one of its walks.
+    fn reaches(&self, mesh: &Mesh, part: u32) -> bool {
+        let Some(polygon) = mesh.patch_polygon(part) else {
+            return false;
+        };
+        self.lights_directly(&polygon) || self.walks_lead_to_light(&polygon, part)
+    }
 
-/// Cosine-weighted rays (origin, unit direction) from the Gauss points of a part.
-fn rays(polygon: &Polygon) -> Vec<(Vec3, Vec3)> {
-    let normal = polygon.normal();
-    let (u, v) = normal.any_orthonormal_pair();
-    let points = gauss_points(polygon);
-    let count = RAYS_PER_POINT * points.len() as u32;
-    let mut rays = Vec::with_capacity(count as usize);
-    for index in 0..count {
-        let share = (index as f32 + 0.5) / count as f32;
-        let (radius, angle) = (share.sqrt(), TAU * GOLDEN * index as f32);
+    fn lights_directly(&self, polygon: &Polygon) -> bool {
+        let luminaires = self.scene.luminaires();
+        self.shooters
+            .iter()
+            .any(|lamp| lamp.form_factor(polygon, self.bvh) > 0.0)
+            || luminaires
+                .iter()
+                .any(|l| luminaire::irradiance(l.source(), polygon, self.far, self.bvh) > 0.0)
+    }
+
+    fn walks_lead_to_light(&self, polygon: &Polygon, part: u32) -> bool {
+        let points = gauss_points(polygon);
+        (0..WALKS).any(|walk| {
+            let seed = (u64::from(part) * WALKS + walk) * LONGEST_WALK;
+            let mut place = Place {
+                position: points[walk as usize % points.len()].position,
+                normal: polygon.normal(),
+            };
+            for step in 0..LONGEST_WALK {
+                let seed = (seed + step) * (2 + 3 * GLANCES);
+                match self.next(place, seed) {
+                    None => return false,
+                    Some(next) if self.is_lit(next, seed + 2) => return true,
+                    Some(next) => place = next,
+                }
+            }
+            false
+        })
+    }
+
+    /// Where a cosine-weighted ray ends; `None` when it escapes or is absorbed.
+    fn next(&self, place: Place, seed: u64) -> Option<Place> {
+        let (u, v) = place.normal.any_orthonormal_pair();
+        let (share, angle) = (noise::unit(seed), TAU * noise::unit(seed + 1));
         let across = u * angle.cos() + v * angle.sin();
-        let direction = across * radius + normal * (1.0 - share).sqrt();
-        rays.push((points[index as usize % points.len()].position, direction));
+        let ray = across * share.sqrt() + place.normal * (1.0 - share).sqrt();
+        let end = place.position + ray * self.far;
+        let Hit {
+            surface,
+            fraction,
+            front,
+        } = self.bvh.nearest(place.position, end)?;
+        let surface = &self.scene.surfaces()[surface as usize];
+        let side = if front { Side::Front } else { Side::Back };
+        let reflects = is_face(surface, side) && !surface.reflectance().is_black();
+        let normal = surface.polygon().normal();
+        reflects.then(|| Place {
+            position: place.position + ray * (self.far * fraction),
+            normal: if front { normal } else { -normal },
+        })
     }
-    rays
-}
 
-/// Faces that emit, or that a lamp or luminaire lights without a bounce.
-fn lit_directly(mesh: &Mesh, scene: &Scene, bvh: &Bvh) -> Vec<bool> {
-    let lamps: Vec<Shooter> = patch_polygons(mesh)
-        .filter(|(patch, _)| mesh.faces[patch.face as usize].emission.is_some())
-        .map(|(_, polygon)| Shooter::new(polygon))
-        .collect();
-    let far = luminaire::far(scene);
-    let mut lit: Vec<bool> = mesh
-        .faces
-        .iter()
-        .map(|face| face.emission.is_some())
-        .collect();
-    for (patch, polygon) in patch_polygons(mesh) {
-        let lit = &mut lit[patch.face as usize];
-        *lit = *lit
-            || lamps
-                .iter()
-                .any(|lamp| lamp.form_factor(&polygon, bvh) > 0.0)
-            || scene
-                .luminaires()
-                .iter()
-                .any(|l| luminaire::irradiance(l.source(), &polygon, far, bvh) > 0.0);
+    /// True when a point gets direct light: from every luminaire asked, and from some lamps.
+    fn is_lit(&self, place: Place, seed: u64) -> bool {
+        let Place { position, normal } = place;
+        let luminaires = self.scene.luminaires();
+        let count = self.lamps.len() as f32;
+        luminaires
+            .iter()
+            .any(|l| luminaire::at_point(l.source(), position, normal, self.far, self.bvh) > 0.0)
+            || (!self.lamps.is_empty()
+                && (0..GLANCES).any(|glance| {
+                    let seed = seed + 3 * glance;
+                    let lamp = &self.lamps[(noise::unit(seed) * count) as usize];
+                    let at = Vec2::new(noise::unit(seed + 1), noise::unit(seed + 2));
+                    let (point, _) = from_unit_square(lamp, at);
+                    let ray = point - position;
+                    ray.dot(normal) > 0.0
+                        && ray.dot(lamp.normal()) < 0.0
+                        && self.bvh.sees(position, point)
+                }))
     }
-    lit
 }

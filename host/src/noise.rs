@@ -1,0 +1,28 @@
+//! Numbers that look random and are the same every time.
+
+/// A number in [0, 1) for every seed: SplitMix64 (Steele, Lea and Flood 2014), top 24 bits.
+#[must_use]
+pub fn unit(seed: u64) -> f32 {
+    let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 40) as f32 / (1_u32 << 24) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_fill_the_unit_interval_evenly() {
+        let count = 10_000;
+        let numbers: Vec<f32> = (0..count).map(unit).collect();
+        assert!(numbers.iter().all(|n| (0.0..1.0).contains(n)));
+        let mean: f32 = numbers.iter().sum::<f32>() / count as f32;
+        // Four standard errors of a uniform mean.
+        assert!(
+            (mean - 0.5).abs() < 4.0 * (1.0 / 12.0 / count as f32).sqrt(),
+            "{mean}"
+        );
+    }
+}
