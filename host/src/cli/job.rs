@@ -141,7 +141,7 @@ pub fn run() -> Result<Outcome> {
     let atlas_bytes = pack(solution, format)?;
     let solution_bytes = solution::write(solution);
     let atlas = Atlas::parse(&atlas_bytes)?;
-    let error = packing_error(solution, &atlas)?;
+    let mut error = packing_error(solution, &atlas)?;
 
     fs::create_dir_all(FOLDER).with_context(|| format!("{FOLDER}: cannot be made"))?;
     let mut folder = Folder(Vec::new());
@@ -159,6 +159,12 @@ pub fn run() -> Result<Outcome> {
         camera: Camera::new(viewpoint, SIDE, SIDE)?,
     };
     let relightings = pictures(&stage, &mut folder)?;
+    for relit in &relightings {
+        if relit.max_codes > error.codes {
+            error.codes = relit.max_codes;
+            error.worst_state.clone_from(&relit.name);
+        }
+    }
     light_layers(&stage, &mut folder)?;
     let report = report(
         &baked,
@@ -319,7 +325,7 @@ fn report(
     }
     line(String::new());
     line(format!(
-        "worst of {} states against f32: {:.2} display codes ({}), {:.2} as shown",
+        "worst of these and of {} test states against f32: {:.2} display codes ({}), {:.2} as shown",
         1 + solution.lights.len() + 64,
         error.codes,
         error.worst_state,
