@@ -128,9 +128,7 @@ fn assert_sum(parts: &[Vec<f32>], sum: &[f32]) {
         (found - sum).abs() > 1e-5 * sum + 1e-6 * mean
     };
     let wrong = sum.iter().enumerate().filter(|pixel| is_wrong(*pixel));
-    // The preview widens a lamp's outline by a 64th of a pixel while the lamp is lit.
-    let (wrong, all) = (wrong.count(), sum.len());
-    assert!(wrong <= all / 10_000, "{wrong} of {all} values");
+    assert_eq!(wrong.count(), 0, "of {} values", sum.len());
 }
 
 fn png(bytes: &[u8]) -> RgbaImage {

@@ -103,7 +103,7 @@ pub enum BakeError {
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// The scene cannot be divided so.
-    #[error(transparent)]
+    #[error("{0}; ask for longer patches and elements (--patch, --element)")]
     Mesh(#[from] MeshError),
     /// The refinement refuses the input.
     #[error(transparent)]

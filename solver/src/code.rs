@@ -56,7 +56,7 @@ pub static DECODED: [u16; 256] = [
 pub enum Code {
     /// As published: one scale for all lights.
     Exp8,
-    /// One scale per light, the smallest at which nothing saturates.
+    /// One scale per light, which puts its largest value on code 254.
     Exp8s,
 }
 
@@ -165,10 +165,10 @@ impl Scale {
         exponent: -15,
     };
 
-    /// The smallest scale not below `value`; `None` unless it is positive and finite.
+    /// The smallest scale not below `value`; `None` unless both are normal positive floats.
     #[must_use]
     pub fn at_least(value: f32) -> Option<Self> {
-        if !(value > 0.0 && value.is_finite()) {
+        if !(value > 0.0 && value.is_normal()) {
             return None;
         }
         let (fraction, exponent) = math::split_exponent(value);
@@ -178,13 +178,14 @@ impl Scale {
         } else {
             (mantissa as u16, exponent - 16)
         };
-        Some(Self {
+        let scale = Self {
             mantissa,
             exponent: exponent as i16,
-        })
+        };
+        scale.value().is_normal().then_some(scale)
     }
 
-    /// The smallest scale at which `largest` does not saturate; [`Self::ONE`] for a light that is
+    /// The scale that puts `largest` on code 254; [`Self::ONE`] for a light that is
     /// dark, or too dim for the range of floats.
     ///
     /// `None` for a value that is negative or not finite.
@@ -193,8 +194,7 @@ impl Scale {
         if !(largest >= 0.0 && largest.is_finite()) {
             return None;
         }
-        let scale = Self::at_least(largest / LARGEST);
-        Some(scale.filter(|s| s.value().is_normal()).unwrap_or(Self::ONE))
+        Some(Self::at_least(largest / LARGEST).unwrap_or(Self::ONE))
     }
 
     /// From its parts as stored; `None` unless the mantissa has its top bit set and the value is a

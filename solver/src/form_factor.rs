@@ -114,7 +114,8 @@ impl Shooter {
                     * open
                     * visible.unwrap_or_else(|| sees_middle(point.position, &above, visibility))
             })
-            .sum()
+            .sum::<f32>()
+            .min(1.0)
     }
 
     /// Share of the kernel that is not hidden; `None` when every sample is below the horizon.
@@ -278,6 +279,23 @@ mod tests {
                 (low..=high).contains(&factor),
                 "{shooter:?} {receiver:?} {factor}"
             );
+        }
+    }
+
+    #[test]
+    fn rounding_does_not_lift_a_factor_above_one() {
+        let receiver = Polygon::new(&[
+            Vec3::new(0.144_529_52, 0.057_797_61, 0.0),
+            Vec3::new(0.952_816_96, 0.193_776_25, 0.0),
+            Vec3::new(0.758_483_4, 0.048_062_027, 0.0),
+        ]);
+        let receiver = receiver.map_or_else(|_| floor(), |polygon| polygon.flipped());
+        let wide = [(-3.0, -3.0), (-3.0, 4.0), (4.0, 4.0), (4.0, -3.0)];
+        let wide = wide.map(|(x, y)| Vec3::new(x, y, 1.207_142_4e-4));
+        let shooter = Shooter::new(Polygon::new(&wide).unwrap());
+        for receiver in [receiver, receiver.flipped(), floor()] {
+            let factor = shooter.form_factor(&receiver, &Open);
+            assert!((0.0..=1.0).contains(&factor), "{factor}");
         }
     }
 

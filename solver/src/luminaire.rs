@@ -1,7 +1,7 @@
 //! Direct irradiance of point, spot, sun and sky at an element.
 //!
 //! Point and spot: `E = I(a) cos b / r^2`, intensity `I` in W/sr, 1 on the axis at unit emission.
-//! Sun: `E = cos b` averaged over its disc. Sky: `E = 1/pi` times the cosine-weighted solid angle
+//! Sun: `E = cos b` averaged over the directions of its disc, 1 on a surface that faces it. Sky: `E = 1/pi` times the cosine-weighted solid angle
 //! that escapes, estimated by 64 stratified directions for each receiver point. All are averaged
 //! over the Gauss points of the element and multiplied by visibility.
 //!
@@ -116,15 +116,21 @@ impl Receiver {
         if angle <= 0.0 {
             return self.escaping(towards, far, visibility) * towards.dot(self.normal).max(0.0);
         }
+        // Even over the cap of directions; on a surface that faces it their mean cosine is
+        // (1 + cos(angle / 2)) / 2, which unit emission makes one.
         let (u, v) = towards.any_orthonormal_pair();
-        let radius = math::tan(angle / 2.0);
+        let edge = math::cos(angle / 2.0);
         let count = (SUN_STRATA * SUN_STRATA) as f32;
-        strata(SUN_STRATA, self.rotation)
+        let sum: f32 = strata(SUN_STRATA, self.rotation)
             .map(|(x, y)| {
-                let ray = (towards + (u * x + v * y) * radius).normalize();
-                self.escaping(ray, far, visibility) * ray.dot(self.normal).max(0.0) / count
+                let share = x * x + y * y;
+                let along = 1.0 - share * (1.0 - edge);
+                let stretch = math::safe_sqrt((1.0 - along * along) / share);
+                let ray = towards * along + (u * x + v * y) * stretch;
+                self.escaping(ray, far, visibility) * ray.dot(self.normal).max(0.0)
             })
-            .sum()
+            .sum();
+        sum / count * 2.0 / (1.0 + edge)
     }
 
     fn skylight(&self, far: f32, visibility: &impl Visibility) -> f32 {
@@ -262,7 +268,7 @@ mod tests {
 
     #[test]
     fn sun_and_sky_give_one_to_a_surface_that_faces_them() {
-        for angle in [0.0, 0.0093] {
+        for angle in [0.0, 0.0093, 0.5, 1.0, 3.0] {
             let sun = Source::Sun {
                 direction: -Vec3::Z,
                 angle,

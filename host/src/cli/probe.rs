@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::json;
 
@@ -38,6 +38,13 @@ struct Places {
 pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     let output = output_path(Some(&arguments.output), Path::new("-"), "csv", json);
     let loaded = load(&arguments.input)?;
+    if loaded.is_radiosity() {
+        bail!(
+            "{}: it holds radiosity, and a probe gives irradiance; probe the solution that it was \
+             packed from, or pack without --quantity radiosity",
+            arguments.input.display()
+        );
+    }
     let solution = loaded.solution();
     let part = if arguments.direct {
         Part::Direct

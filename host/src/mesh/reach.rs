@@ -1,8 +1,10 @@
 //! Which faces light reaches, directly or by any number of bounces.
 //!
-//! A face is reached when it emits, when a part of it receives direct light, or when a walk from
-//! it, ray by ray from surface to surface, comes to a point that does. Walks go through points, not
-//! parts, so a floor that is lit around a closed box does not light the inside of the box. Each
+//! Light casts rays from every lamp and luminaire and marks the *lit points* where they end. A face
+//! is reached when it emits, when a part of it receives direct light, or when two of the walks from
+//! that part, ray by ray from surface to surface, come to a point that sees a lit point or a lamp.
+//! Walks go through points, not parts, so a floor that is lit around a closed box does not light the
+//! inside of the box; two, because rounding lets one walk in ten thousand through an edge. Each
 //! part, as large as a patch or the default patch, whichever is larger, starts 32 walks of up to 16
 //! rays. Assumption: a face that all of them miss gets too little light to matter.
 
@@ -14,7 +16,7 @@ use relume::form_factor::Shooter;
 use relume::geometry::{Polygon, from_unit_square, gauss_points};
 use relume::luminaire;
 use relume::mesh::{Mesh, MeshError, Side, Spacing, is_face, subdivide};
-use relume::scene::Scene;
+use relume::scene::{Scene, Source};
 use relume::visibility::Visibility;
 
 use super::OwnedMesh;
@@ -27,8 +29,17 @@ const WALKS: u64 = 32;
 /// Rays of a walk.
 const LONGEST_WALK: u64 = 16;
 
-/// Points of lamps that a point on a walk looks at.
+/// Walks of a part that must come to light.
+const WITNESSES: usize = 2;
+
+/// Lit points, and points of lamps, that a point on a walk looks at.
 const GLANCES: u64 = 4;
+
+/// Rays that light casts from each luminaire, and from each patch of a lamp.
+const CASTS: u64 = 64;
+
+/// By how much a point is drawn from its polygon's outline towards the middle, away from edges.
+const INWARDS: f32 = 1e-4;
 
 /// The sides of surfaces that light reaches.
 #[derive(Debug)]
@@ -80,6 +91,10 @@ pub fn reached_faces(
     Ok(ReachedFaces(sides))
 }
 
+/// Sine of the angle to a surface below which nothing is exchanged: the two sides of one plane do not
+/// see each other, whatever rounding says.
+const GRAZING: f32 = 1e-3;
+
 /// A point on a side of a surface.
 #[derive(Clone, Copy)]
 struct Place {
@@ -93,6 +108,7 @@ struct Surroundings<'a> {
     bvh: &'a Bvh,
     lamps: Vec<Polygon>,
     shooters: Vec<Shooter>,
+    lit: Vec<Place>,
     far: f32,
 }
 
@@ -103,16 +119,58 @@ impl<'a> Surroundings<'a> {
             .filter(emits)
             .filter_map(|part| mesh.patch_polygon(part))
             .collect();
-        Self {
+        let mut surroundings = Self {
             scene,
             bvh,
             shooters: lamps.iter().map(|lamp| Shooter::new(*lamp)).collect(),
             lamps,
+            lit: Vec::new(),
             far: luminaire::far(scene),
-        }
+        };
+        surroundings.lit = surroundings.cast_light();
+        surroundings
     }
 
-    /// True when light comes to a part, directly or along one of its walks.
+    /// Where the rays of lamps, point and spot lights end. Sun and sky light what sees them, and
+    /// walks that escape ask them themselves.
+    fn cast_light(&self) -> Vec<Place> {
+        let mut lit = Vec::new();
+        for (lamp, number) in self.lamps.iter().zip(0_u64..) {
+            for cast in 0..CASTS {
+                let seed = (number * CASTS + cast) * 4;
+                let at = Vec2::new(noise::unit(seed), noise::unit(seed + 1));
+                let start = Place {
+                    position: from_unit_square(lamp, at).0,
+                    normal: lamp.normal(),
+                };
+                lit.extend(self.next(start, seed + 2));
+            }
+        }
+        for (luminaire, number) in self.scene.luminaires().iter().zip(0_u64..) {
+            let (position, axis, least) = match *luminaire.source() {
+                Source::Point { position } => (position, Vec3::Z, -1.0),
+                Source::Spot {
+                    position,
+                    direction,
+                    outer,
+                    ..
+                } => (position, direction, outer.cos()),
+                Source::Sun { .. } | Source::Sky => continue,
+            };
+            let (u, v) = axis.any_orthonormal_pair();
+            for cast in 0..CASTS {
+                let seed = !((number * CASTS + cast) * 2);
+                let along = 1.0 - noise::unit(seed) * (1.0 - least);
+                let angle = TAU * noise::unit(seed - 1);
+                let across = (1.0 - along * along).max(0.0).sqrt();
+                let ray = axis * along + (u * angle.cos() + v * angle.sin()) * across;
+                lit.extend(self.end_of(position, ray));
+            }
+        }
+        lit
+    }
+
+    /// True when light comes to a part, directly or along its walks.
     fn reaches(&self, mesh: &Mesh, part: u32) -> bool {
         let Some(polygon) = mesh.patch_polygon(part) else {
             return false;
@@ -132,22 +190,26 @@ impl<'a> Surroundings<'a> {
 
     fn walks_lead_to_light(&self, polygon: &Polygon, part: u32) -> bool {
         let points = gauss_points(polygon);
-        (0..WALKS).any(|walk| {
+        let leads_to_light = |walk: &u64| {
             let seed = (u64::from(part) * WALKS + walk) * LONGEST_WALK;
             let mut place = Place {
-                position: points[walk as usize % points.len()].position,
+                position: points[*walk as usize % points.len()].position,
                 normal: polygon.normal(),
             };
             for step in 0..LONGEST_WALK {
-                let seed = (seed + step) * (2 + 3 * GLANCES);
+                let seed = (seed + step) * (2 + 4 * GLANCES);
+                if self.is_lit(place, seed + 2) {
+                    return true;
+                }
                 match self.next(place, seed) {
                     None => return false,
-                    Some(next) if self.is_lit(next, seed + 2) => return true,
                     Some(next) => place = next,
                 }
             }
             false
-        })
+        };
+        let witnesses = (0..WALKS).filter(leads_to_light);
+        witnesses.take(WITNESSES).count() == WITNESSES
     }
 
     /// Where a cosine-weighted ray ends; `None` when it escapes or is absorbed.
@@ -156,40 +218,63 @@ impl<'a> Surroundings<'a> {
         let (share, angle) = (noise::unit(seed), TAU * noise::unit(seed + 1));
         let across = u * angle.cos() + v * angle.sin();
         let ray = across * share.sqrt() + place.normal * (1.0 - share).sqrt();
-        let end = place.position + ray * self.far;
+        self.end_of(place.position, ray)
+    }
+
+    /// Where a ray meets a side that reflects; `None` when it escapes or is absorbed.
+    fn end_of(&self, from: Vec3, ray: Vec3) -> Option<Place> {
         let Hit {
             surface,
             fraction,
             front,
-        } = self.bvh.nearest(place.position, end)?;
+        } = self.bvh.nearest(from, from + ray * self.far)?;
         let surface = &self.scene.surfaces()[surface as usize];
         let side = if front { Side::Front } else { Side::Back };
         let reflects = is_face(surface, side) && !surface.reflectance().is_black();
-        let normal = surface.polygon().normal();
+        let polygon = surface.polygon();
+        let position = from + ray * (self.far * fraction);
         reflects.then(|| Place {
-            position: place.position + ray * (self.far * fraction),
-            normal: if front { normal } else { -normal },
+            position: position + (polygon.center() - position) * INWARDS,
+            normal: if front {
+                polygon.normal()
+            } else {
+                -polygon.normal()
+            },
         })
     }
 
-    /// True when a point gets direct light: from every luminaire asked, and from some lamps.
+    /// True when a point gets light: from a luminaire, a lamp or a lit point.
     fn is_lit(&self, place: Place, seed: u64) -> bool {
         let Place { position, normal } = place;
         let luminaires = self.scene.luminaires();
-        let count = self.lamps.len() as f32;
         luminaires
             .iter()
             .any(|l| luminaire::at_point(l.source(), position, normal, self.far, self.bvh) > 0.0)
-            || (!self.lamps.is_empty()
-                && (0..GLANCES).any(|glance| {
-                    let seed = seed + 3 * glance;
-                    let lamp = &self.lamps[(noise::unit(seed) * count) as usize];
+            || (0..GLANCES).any(|glance| {
+                let seed = seed + 4 * glance;
+                let lamp = pick(&self.lamps, seed).map(|lamp| {
                     let at = Vec2::new(noise::unit(seed + 1), noise::unit(seed + 2));
-                    let (point, _) = from_unit_square(lamp, at);
-                    let ray = point - position;
-                    ray.dot(normal) > 0.0
-                        && ray.dot(lamp.normal()) < 0.0
-                        && self.bvh.sees(position, point)
-                }))
+                    Place {
+                        position: from_unit_square(lamp, at).0,
+                        normal: lamp.normal(),
+                    }
+                });
+                let lit = pick(&self.lit, seed + 3).copied();
+                lamp.is_some_and(|lamp| self.exchange(place, lamp))
+                    || lit.is_some_and(|lit| self.exchange(place, lit))
+            })
     }
+
+    /// True when two places face and see each other.
+    fn exchange(&self, a: Place, b: Place) -> bool {
+        let ray = b.position - a.position;
+        let least = GRAZING * ray.length();
+        ray.dot(a.normal) > least
+            && ray.dot(b.normal) < -least
+            && self.bvh.sees(a.position, b.position)
+    }
+}
+
+fn pick<T>(items: &[T], seed: u64) -> Option<&T> {
+    items.get((noise::unit(seed) * items.len() as f32) as usize)
 }

@@ -94,7 +94,7 @@ impl Relit<'_> {
                 continue;
             }
             if face.element_count == 0 {
-                facets.push(Facet::plain(face.polygon, *exitance));
+                facets.push(Facet::lamp(face.polygon, *exitance));
             }
             for element in face.element_range() {
                 let own = elements.get_mut(element as usize);
@@ -105,7 +105,7 @@ impl Relit<'_> {
         let is_inside = self.bounds().is_some_and(|b| b.contains(camera.eye()));
         if is_inside {
             let dark = self.dark_sides().into_iter().filter(faces_eye);
-            facets.extend(dark.map(|polygon| Facet::plain(polygon, Rgb::BLACK)));
+            facets.extend(dark.map(Facet::dark));
         }
         facets
     }

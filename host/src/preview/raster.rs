@@ -84,11 +84,7 @@ impl Outline {
         });
 
         let normal = facet.polygon.normal().as_dvec3();
-        let bias = if facet.exitance == Rgb::BLACK {
-            1.0
-        } else {
-            EMITTER_BIAS
-        };
+        let bias = if facet.is_lamp { EMITTER_BIAS } else { 1.0 };
         let scale = bias / normal.dot(corners[0]);
         let nearness = camera.line(normal).map(|coefficient| coefficient * scale);
 

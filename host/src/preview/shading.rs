@@ -36,22 +36,34 @@ pub(super) struct Facet {
     pub(super) reflectance: Rgb,
     /// Emitted exitance, W/m2.
     pub(super) exitance: Rgb,
+    /// Whether it belongs to a lamp, lit or not: what is drawn must not depend on the mix.
+    pub(super) is_lamp: bool,
 }
 
 impl Facet {
-    /// A polygon without elements: it only emits.
-    pub(super) fn plain(polygon: Polygon, exitance: Rgb) -> Self {
+    /// A lamp without elements: it only emits.
+    pub(super) fn lamp(polygon: Polygon, exitance: Rgb) -> Self {
+        Self {
+            exitance,
+            is_lamp: true,
+            ..Self::dark(polygon)
+        }
+    }
+
+    /// A side that neither reflects nor emits.
+    pub(super) fn dark(polygon: Polygon) -> Self {
         Self {
             polygon,
             irradiance: [Rgb::BLACK; 4],
             reflectance: Rgb::BLACK,
-            exitance,
+            exitance: Rgb::BLACK,
+            is_lamp: false,
         }
     }
 
-    /// True when it neither reflects nor emits.
+    /// True when it neither reflects nor emits, whatever the mix.
     pub(super) fn is_dark(&self) -> bool {
-        self.reflectance == Rgb::BLACK && self.exitance == Rgb::BLACK
+        self.reflectance == Rgb::BLACK && !self.is_lamp
     }
 
     /// Radiance `(rho E + M) / pi` at a point of the polygon, W/m2/sr.
@@ -87,6 +99,7 @@ pub(super) fn facets(mesh: &Mesh, irradiance: &[Rgb], exitance: &[Rgb]) -> Vec<O
                 irradiance: corners,
                 reflectance: element.reflectance,
                 exitance: *exitance.get(face as usize)?,
+                is_lamp: mesh.faces.get(face as usize)?.emission.is_some(),
             })
         })
         .collect()

@@ -41,8 +41,8 @@ pub enum FileError {
     /// The bytes do not start like a solution.
     #[error("this is not a solution; make one with `relume bake`")]
     NotASolution,
-    /// Written by a later version than this one knows.
-    #[error("solution version {0} is newer than the {VERSION} known here; update relume")]
+    /// Written in another version of the format than this one knows.
+    #[error("solution version {0} is not the {VERSION} known here; update relume or bake again")]
     Version(u16),
     /// The file ends too early.
     #[error("the file is cut off in its {0}; bake or copy it again")]

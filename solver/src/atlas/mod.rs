@@ -129,7 +129,7 @@ pub struct AtlasElement {
 pub enum AtlasError {
     /// The bytes do not start like an atlas.
     NotAnAtlas,
-    /// Written by a later version than this one knows.
+    /// Written in another version of the format than this one knows.
     Version(u16),
     /// Fewer bytes than the header promises.
     Truncated {
@@ -158,7 +158,7 @@ impl fmt::Display for AtlasError {
             Self::NotAnAtlas => f.write_str("these bytes are not an atlas"),
             Self::Version(version) => write!(
                 f,
-                "atlas version {version} is newer than the {VERSION} known here; update relume"
+                "atlas version {version} is not the {VERSION} known here; update relume or pack again"
             ),
             Self::Truncated { needed } => {
                 write!(f, "the atlas is cut off: {needed} bytes are needed")

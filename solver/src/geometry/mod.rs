@@ -148,13 +148,6 @@ impl Polygon {
         self.origin() + offset / vertices.len() as f32
     }
 
-    /// Length of the longest edge or diagonal from the first vertex.
-    #[must_use]
-    pub fn diameter(&self) -> f32 {
-        let [a, b, c, d] = self.vertices;
-        (c - a).length().max((d - b).length())
-    }
-
     /// Length of the longest edge.
     #[must_use]
     pub fn longest_edge(&self) -> f32 {

@@ -40,7 +40,7 @@ impl fmt::Display for MeshError {
             Self::Spacing => f.write_str("patch and element lengths must be positive and finite"),
             Self::TooFine { surface } => write!(
                 f,
-                "surface {surface}: an edge needs more than 65535 elements; ask for longer ones"
+                "surface {surface}: an edge needs more than 65535 elements"
             ),
             Self::TooManyFaces { limit } => {
                 write!(f, "more faces than the storage holds ({limit})")

@@ -90,6 +90,9 @@ impl<const K: usize> Refinement<'_, K> {
     }
 
     fn lookup(&self, lanes: &[Lanes<K>], element: u32, light: u32) -> Rgb {
+        if element as usize >= self.mesh.elements.len() || light >= self.lights {
+            return Rgb::BLACK;
+        }
         let (block, lane) = address::<K>(light);
         let index = block * self.mesh.elements.len() + element as usize;
         lanes

@@ -11,7 +11,7 @@
 //! emitted (area lights) or brought into the scene (luminaires); of the solution: the largest.
 //! Ambient term (Cohen et al. 1988, eq. 12), per light, as an irradiance:
 //! `a = g U / (1 - g rho)`, with the unshot power `U` over the whole area, the mean reflectance
-//! `rho`, and `g`, the share of the power shot so far that landed on elements (1 if all did).
+//! `rho`, and `g`, the share of what the rows so far sent out that landed on elements (1 if all did).
 //!
 //! Lights come in blocks of `K` lanes; all blocks share one row. Rows that the caller hands in are
 //! kept as long as the row storage has room and are shot again without being evaluated again.
@@ -52,7 +52,8 @@ impl<'a, const K: usize> Refinement<'a, K> {
     /// [`Self::illuminate`], importances by [`Self::set_importance`].
     ///
     /// # Errors
-    /// Storage that is too small, by the name of its limit; a residual that is not positive.
+    /// Storage that is too small, by the name of its limit; a residual that is not positive; a face
+    /// that emits under a tag that does not exist.
     pub fn new(
         mesh: Mesh<'a>,
         lights: u32,
@@ -64,6 +65,10 @@ impl<'a, const K: usize> Refinement<'a, K> {
             return Err(RefineError::Residual);
         }
         storage.fit(&mesh, lights)?;
+        let mut emissions = mesh.faces.iter().filter_map(|face| face.emission);
+        if emissions.any(|emission| emission.light >= lights) {
+            return Err(RefineError::Unknown);
+        }
         storage.irradiance.fill([[0.0; K]; 3]);
         storage.direct.fill([[0.0; K]; 3]);
         storage.unshot.fill([[0.0; K]; 3]);
@@ -116,6 +121,9 @@ impl<'a, const K: usize> Refinement<'a, K> {
     pub fn set_importance(&mut self, light: u32, importance: f32) -> Result<(), RefineError> {
         if !(importance > 0.0 && importance.is_finite()) {
             return Err(RefineError::Importance { light });
+        }
+        if light >= self.lights {
+            return Err(RefineError::Unknown);
         }
         let (block, lane) = address::<K>(light);
         let block = self.storage.blocks.get_mut(block);

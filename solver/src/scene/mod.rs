@@ -4,7 +4,7 @@
 //! of area lights and the [`Luminaire`]s. Unit emission of a tag: area light, exitance 1 W/m2; point
 //! and spot, intensity 1 W/sr; sun, irradiance 1 W/m2 on a surface that faces it; sky, radiance
 //! 1/pi from every direction that escapes. Colour and strength live outside, in the mix; inside a
-//! group of several luminaires each emits its *share*, per channel in [0, 1].
+//! group of several luminaires each emits its *share*, per channel, not above 1 by convention.
 
 mod source;
 mod surface;
