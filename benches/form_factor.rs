@@ -50,7 +50,7 @@ fn rows(criterion: &mut Criterion) {
     let mesh = owned.view();
     let (brute, bvh) = (
         Occluders(&room.scene.surfaces),
-        Bvh::new(&room.scene.surfaces),
+        Bvh::for_scene(&room.scene.view().expect("a legal scene")),
     );
     let mut row = vec![0.0; mesh.elements.len()];
     let pairs = facing_pairs(&mesh, &mut row);

@@ -48,7 +48,7 @@ fn divide(criterion: &mut Criterion, name: &str, builtin: &Builtin) {
     });
     group.throughput(Throughput::Elements(builtin.scene.surfaces.len() as u64));
     group.bench_function(BenchmarkId::new("tree", name), |bencher| {
-        bencher.iter(|| Bvh::new(&builtin.scene.surfaces));
+        bencher.iter(|| Bvh::for_scene(&view));
     });
     group.finish();
 }

@@ -92,7 +92,7 @@ fn form_factors_between_patches_are_reciprocal() {
         },
     );
     let mesh = solution.mesh.view();
-    let bvh = Bvh::new(&room.scene.surfaces);
+    let bvh = Bvh::for_scene(&room.scene.view().expect("legal"));
     let count = mesh.patches.len();
     // power[i][j] = A_j F_ji: what j gets of a unit of radiosity of i.
     let mut power = vec![vec![0.0_f32; count]; count];

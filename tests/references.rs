@@ -1,4 +1,5 @@
-//! Solutions against references that share no transport code with them.
+//! Solutions against the dense solution of the same form factors, and against a path tracer that
+//! shares no transport code with them.
 
 mod bake;
 
@@ -15,7 +16,7 @@ use relume_host::solution::Solution;
 fn dense(builtin: &Builtin, solution: &Solution) -> DenseSolution {
     let mesh = solution.mesh.view();
     let (n, p) = (mesh.elements.len(), mesh.patches.len());
-    let bvh = Bvh::new(&builtin.scene.surfaces);
+    let bvh = Bvh::for_scene(&builtin.scene.view().expect("legal"));
     let mut form_factors = vec![0.0_f32; n * p];
     for (row, patch) in form_factors.chunks_mut(n).zip(0..) {
         form_factor::row(&mesh, patch, &bvh, row);

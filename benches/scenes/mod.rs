@@ -65,7 +65,7 @@ pub fn baked(scene: &OwnedScene, settings: &Settings) -> Solution {
 pub fn meshed(builtin: &Builtin) -> OwnedMesh {
     let scene = &builtin.scene;
     let view = scene.view().expect("a legal scene");
-    let bvh = Bvh::new(&scene.surfaces);
+    let bvh = Bvh::for_scene(&scene.view().expect("a legal scene"));
     mesh::build(scene, &view, builtin.spacing, &bvh).expect("a mesh that fits")
 }
 

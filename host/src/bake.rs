@@ -141,7 +141,7 @@ pub fn bake(
     }
     let view = scene.view()?;
     let spacing = mesh::spacing(&view, settings.patch, settings.element)?;
-    let bvh = Bvh::new(&scene.surfaces);
+    let bvh = Bvh::for_scene(&view);
     let mesh = mesh::build(scene, &view, spacing, &bvh)?;
     let mut memory = Memory::new(&mesh, scene.lights.len(), settings)?;
     let mut refinement = Refinement::<LANES>::new(

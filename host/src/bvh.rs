@@ -14,7 +14,8 @@ use obvhs::ray::{Ray, RayHit};
 use obvhs::{Boundable, BvhBuildParams};
 
 use relume::geometry::Polygon;
-use relume::scene::Surface;
+use relume::luminaire;
+use relume::scene::{Scene, Source, Surface};
 use relume::visibility::Visibility;
 
 /// Surfaces in a tree of boxes.
@@ -55,25 +56,43 @@ impl Boundable for Bounded {
 }
 
 impl Bounded {
-    fn new(polygon: &Polygon) -> Self {
+    /// `farthest` is the largest coordinate of any segment's end.
+    fn new(polygon: &Polygon, farthest: f32) -> Self {
         let mut bounds = Aabb::empty();
         for vertex in polygon.vertices() {
             bounds.extend(Vec3A::from(*vertex));
         }
-        let magnitude = bounds.min.abs().max(bounds.max.abs()).max_element();
-        let (_, tolerance) = polygon.height(polygon.center());
-        let margin = Vec3A::splat(2.0 * tolerance + 64.0 * f32::EPSILON * magnitude);
+        let (_, tolerance) = polygon.height(Vec3::splat(farthest));
+        let margin = Vec3A::splat(2.0 * tolerance);
         Self(Aabb::new(bounds.min - margin, bounds.max + margin))
     }
 }
 
+/// Largest coordinate of some points.
+fn magnitude(points: impl Iterator<Item = Vec3>) -> f32 {
+    points.map(|p| p.abs().max_element()).fold(0.0, f32::max)
+}
+
 impl Bvh {
-    /// Builds the tree.
+    /// Builds the tree for a scene: segments between its surfaces, its luminaires and the sky.
     #[must_use]
-    pub fn new(surfaces: &[Surface]) -> Self {
+    pub fn for_scene(scene: &Scene) -> Self {
+        let positions = scene.luminaires().iter().map(|l| match *l.source() {
+            Source::Point { position } | Source::Spot { position, .. } => position,
+            Source::Sun { .. } | Source::Sky => Vec3::ZERO,
+        });
+        let surfaces = scene.surfaces();
+        let vertices = surfaces.iter().flat_map(|s| s.polygon().vertices());
+        let farthest = magnitude(vertices.copied().chain(positions)) + luminaire::far(scene);
+        Self::new(surfaces, farthest)
+    }
+
+    /// Builds the tree; `farthest` is the largest coordinate of any segment that will be asked for.
+    #[must_use]
+    pub fn new(surfaces: &[Surface], farthest: f32) -> Self {
         let boxes: Vec<Bounded> = surfaces
             .iter()
-            .map(|surface| Bounded::new(surface.polygon()))
+            .map(|surface| Bounded::new(surface.polygon(), farthest))
             .collect();
         let mut build_time = Duration::ZERO;
         let tree = build_bvh2(&boxes, BvhBuildParams::very_slow_build(), &mut build_time);
@@ -153,7 +172,7 @@ mod tests {
             ends in proptest::collection::vec((point(), point()), 50),
         ) {
             let surfaces = surfaces(&triangles);
-            let bvh = Bvh::new(&surfaces);
+            let bvh = Bvh::new(&surfaces, 2.0);
             let brute = Occluders(&surfaces);
             for (from, to) in ends {
                 prop_assert_eq!(bvh.sees(from, to), brute.sees(from, to), "{} {}", from, to);
@@ -175,12 +194,30 @@ mod tests {
                 let o = Vec3::new(at(x), at(y), at(z));
                 Surface::new(0, &[o, o + u, o + u + v, o + v], Rgb::BLACK).unwrap()
             }).collect();
-            let bvh = Bvh::new(&surfaces);
+            let bvh = Bvh::new(&surfaces, 2.0);
             let brute = Occluders(&surfaces);
             for &(x, y, z, w, axis) in &steps {
                 let from = Vec3::new(at(x), at(y), at(z)) * 0.75;
                 let mut to = from;
                 to[axis as usize] += f32::from(w) - 1.7;
+                prop_assert_eq!(bvh.sees(from, to), brute.sees(from, to), "{} {}", from, to);
+            }
+        }
+
+        #[test]
+        fn small_surfaces_and_far_ends_agree_as_well(
+            triangles in proptest::collection::vec([point(), point(), point()], 1..20),
+            ends in proptest::collection::vec((0_usize..60, point()), 50),
+            far in prop_oneof![Just(30.0_f32), Just(1e3), Just(1e5)],
+        ) {
+            let surfaces = surfaces(&triangles);
+            let bvh = Bvh::new(&surfaces, 2.0 * far);
+            let brute = Occluders(&surfaces);
+            for (corner, direction) in ends {
+                // Just past an outline, where the tolerance of a far end decides.
+                let corner = triangles[corner / 3 % triangles.len()][corner % 3];
+                let from = corner + direction * 1e-5 - Vec3::Z;
+                let to = from + (corner - from) * far;
                 prop_assert_eq!(bvh.sees(from, to), brute.sees(from, to), "{} {}", from, to);
             }
         }

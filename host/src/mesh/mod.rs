@@ -236,7 +236,7 @@ mod tests {
             patch: 1.0,
             element: 0.5,
         };
-        let mesh = build(&scene, &view, spacing, &Bvh::new(&scene.surfaces)).unwrap();
+        let mesh = build(&scene, &view, spacing, &Bvh::for_scene(&view)).unwrap();
         let faces: Vec<(u32, Side)> = mesh.faces.iter().map(|f| (f.surface, f.side)).collect();
         let expected: Vec<(u32, Side)> = (0..6)
             .map(|i| (i, Side::Front))

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use relume::form_factor::Shooter;
 use relume::geometry::{Polygon, from_unit_square, gauss_points};
 use relume::luminaire;
-use relume::mesh::{Mesh, MeshError, Side, Spacing, is_face, subdivide};
+use relume::mesh::{Face, Mesh, MeshError, Side, Spacing, is_face, subdivide};
 use relume::scene::{Scene, Source};
 use relume::visibility::Visibility;
 
@@ -86,7 +86,18 @@ pub fn reached_faces(
         .collect();
     for (part, reached) in mesh.patches.iter().zip(reached) {
         let face = &mesh.faces[part.face as usize];
-        sides[face.surface as usize][side_index(face.side)] |= reached || face.emission.is_some();
+        sides[face.surface as usize][side_index(face.side)] |= reached;
+    }
+    // Lamps start light; what reflects nothing stores nothing, so nothing is gained by leaving it out.
+    let reflects = |face: &Face| {
+        !scene.surfaces()[face.surface as usize]
+            .reflectance()
+            .is_black()
+    };
+    for face in mesh.faces {
+        if face.emission.is_some() || !reflects(face) {
+            sides[face.surface as usize][side_index(face.side)] = true;
+        }
     }
     Ok(ReachedFaces(sides))
 }

@@ -94,7 +94,10 @@ impl Relit<'_> {
                 continue;
             }
             if face.element_count == 0 {
-                facets.push(Facet::lamp(face.polygon, *exitance));
+                facets.push(match face.emission {
+                    Some(_) => Facet::lamp(face.polygon, *exitance),
+                    None => Facet::dark(face.polygon),
+                });
             }
             for element in face.element_range() {
                 let own = elements.get_mut(element as usize);

@@ -174,12 +174,15 @@ impl AtlasMesh<'_> {
                 return Err(AtlasError::Illegal("light of a face"));
             }
         }
+        let mut face = 0;
         for index in 0..self.element_count() {
             let element = self.element(index);
             let element = element.ok_or(AtlasError::Illegal("element"))?;
-            if element.face >= self.face_count() {
+            // Elements stand face by face.
+            if element.face >= self.face_count() || element.face < face {
                 return Err(AtlasError::Illegal("face of an element"));
             }
+            face = element.face;
         }
         Ok(())
     }

@@ -23,6 +23,9 @@ use crate::mesh::Side;
 
 use view::View;
 
+/// A lamp flush with its ceiling is in front of it: more than the rounding of depths, less than shows.
+const LAMP_NEARNESS: f32 = 1.0 + 1e-4;
+
 /// A pinhole camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
@@ -43,7 +46,7 @@ pub enum Shown {
     Element(u32),
     /// A face without elements, by number: a lamp.
     Lamp(u32),
-    /// A side of a surface that no light reaches.
+    /// A side of a surface that no light reaches, or that reflects nothing.
     Unlit,
 }
 
@@ -124,7 +127,12 @@ pub fn paint<D: DrawTarget>(
         }
         band.fill(Sample::new(background));
         for_each_polygon(mesh, camera.eye, |shown, polygon| {
-            if let Some(outline) = view.project(&polygon) {
+            let nearness = if matches!(shown, Shown::Lamp(_)) {
+                LAMP_NEARNESS
+            } else {
+                1.0
+            };
+            if let Some(outline) = view.project(&polygon, nearness) {
                 view.fill(&outline, top, rows, band, || color(shown));
             }
         });
@@ -143,27 +151,26 @@ pub fn paint<D: DrawTarget>(
 /// Everything that can hide or show, as long as it is turned towards the eye.
 fn for_each_polygon(mesh: &AtlasMesh, eye: Vec3, mut draw: impl FnMut(Shown, Polygon)) {
     let is_seen = |polygon: &Polygon| (eye - polygon.origin()).dot(polygon.normal()) > 0.0;
-    let mut current = None;
-    for index in 0..mesh.element_count() {
-        let Some(element) = mesh.element(index) else {
+    let mut next = 0;
+    for number in 0..mesh.face_count() {
+        let Some(face) = mesh.face(number) else {
             continue;
         };
-        if current.is_none_or(|(face, _)| face != element.face) {
-            current = mesh.face(element.face).map(|f| (element.face, f.polygon));
+        let is_seen = is_seen(&face.polygon);
+        let first = next;
+        while let Some(element) = mesh.element(next).filter(|e| e.face == number) {
+            if is_seen {
+                let part = face.polygon.part(element.from, element.to);
+                draw(Shown::Element(next), part);
+            }
+            next += 1;
         }
-        if let Some((_, polygon)) = current.filter(|(_, polygon)| is_seen(polygon)) {
-            draw(
-                Shown::Element(index),
-                polygon.part(element.from, element.to),
-            );
-        }
-    }
-    for index in 0..mesh.face_count() {
-        if let Some(face) = mesh.face(index)
-            && face.emission.is_some()
-            && is_seen(&face.polygon)
-        {
-            draw(Shown::Lamp(index), face.polygon);
+        if is_seen && next == first {
+            let shown = match face.emission {
+                Some(_) => Shown::Lamp(number),
+                None => Shown::Unlit,
+            };
+            draw(shown, face.polygon);
         }
     }
     if is_inside(mesh, eye) {

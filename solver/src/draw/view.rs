@@ -53,7 +53,9 @@ impl View {
     }
 
     /// The outline on the display, cut off at the near plane; `None` when nothing is left.
-    pub(super) fn project(&self, polygon: &Polygon) -> Option<Outline> {
+    ///
+    /// `nearness` multiplies the reciprocal depth: above 1 it wins over what lies in the same plane.
+    pub(super) fn project(&self, polygon: &Polygon, nearness: f32) -> Option<Outline> {
         let relative: Clipped = polygon
             .vertices()
             .iter()
@@ -68,7 +70,7 @@ impl View {
                 let offset = Vec2::new(v.dot(self.right), -v.dot(self.up));
                 Vertex {
                     at: self.middle + offset * (self.focal * depth),
-                    depth,
+                    depth: depth * nearness,
                 }
             })
             .collect();

@@ -29,8 +29,8 @@ pub struct Counts {
 
 /// Divides every face for which `keep(surface, side)` holds into patches and elements.
 ///
-/// The front of every surface is a face, the back of every two-sided one another; faces that
-/// neither reflect nor emit are left out.
+/// The front of every surface is a face, the back of every two-sided one another; a face that
+/// neither reflects nor emits has no patches.
 ///
 /// # Errors
 /// [`MeshError`]: a bad spacing, an edge that would be cut too often, or full storage.
@@ -56,14 +56,10 @@ pub fn subdivide(
     Ok(counts)
 }
 
-/// True when this side of the surface takes part in the exchange: it reflects or emits.
+/// True for the front of every surface, and for the back of a two-sided one.
 #[must_use]
 pub fn is_face(surface: &Surface, side: Side) -> bool {
-    let reflects = !surface.reflectance().is_black();
-    match side {
-        Side::Front => reflects || surface.emission().is_some(),
-        Side::Back => reflects && surface.is_two_sided(),
-    }
+    side == Side::Front || surface.is_two_sided()
 }
 
 fn subdivide_face(
@@ -96,17 +92,20 @@ fn subdivide_face(
         first_element: counts.elements,
         element_count,
     })?;
+    counts.faces += 1;
+    if element_count == 0 && emission.is_none() {
+        return Ok(());
+    }
     let first_patch = counts.patches;
     for (from, to) in cells(patches, polygon.is_triangle()) {
         sink.patch(Patch {
-            face: counts.faces,
+            face: counts.faces - 1,
             from,
             to,
             area: polygon.part(from, to).area(),
         })?;
         counts.patches += 1;
     }
-    counts.faces += 1;
     if element_count == 0 {
         return Ok(());
     }
@@ -332,11 +331,14 @@ mod tests {
         let scene = Scene::new(&surfaces, &[], 1).unwrap();
         let mut storage = MeshStorage::<8, 64, 128>::new();
         let counts = subdivide(&scene, SPACING, |_, _| true, &mut storage).unwrap();
-        assert_eq!((counts.faces, counts.patches, counts.elements), (3, 18, 48));
+        assert_eq!((counts.faces, counts.patches, counts.elements), (4, 18, 48));
         let mesh = storage.mesh();
         assert!(mesh.faces[0].emission.is_some());
         assert_eq!(mesh.faces[1].side, Side::Back);
         assert!(mesh.faces[1].emission.is_none());
-        assert_eq!(mesh.faces[2].element_count, 0);
+        assert_eq!(
+            (mesh.faces[2].element_count, mesh.faces[3].element_count),
+            (0, 0)
+        );
     }
 }
