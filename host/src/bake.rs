@@ -140,7 +140,7 @@ pub fn bake(
         return Err(BakeError::NoLight);
     }
     let view = scene.view()?;
-    let spacing = mesh::spacing(&view, settings.patch, settings.element)?;
+    let spacing = mesh::spacing(&view, settings.patch, settings.element);
     let bvh = Bvh::for_scene(&view);
     let mesh = mesh::build(scene, &view, spacing, &bvh)?;
     let mut memory = Memory::new(&mesh, scene.lights.len(), settings)?;
@@ -277,6 +277,12 @@ fn refine(
         filler.patch(&mesh, patch, &mut row);
         refinement.shoot(patch, &row)?;
     }
+    // A wish to stop that came while known rows were shot is heard here.
+    let _ = watch(Progress {
+        rows: refinement.rows_evaluated(),
+        patches: mesh.patches.len(),
+        residual: refinement.residual(),
+    });
     refinement.finish();
     Ok(())
 }

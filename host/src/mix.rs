@@ -102,23 +102,35 @@ impl Value {
     }
 }
 
-/// A setting names a light that is not there.
+/// Largest weight of a light: far beyond any lamp, and its sums over lights stay finite.
+const LARGEST_WEIGHT: f32 = 1e20;
+
+/// Why settings make no mix.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("there is no light `{name}`; the lights are: {known}")]
-pub struct UnknownLight {
-    name: String,
-    known: String,
+#[non_exhaustive]
+pub enum MixError {
+    /// A setting names a light that is not there.
+    #[error("there is no light `{name}`; the lights are: {known}")]
+    UnknownLight {
+        /// The name that was given.
+        name: String,
+        /// Some names that are there.
+        known: String,
+    },
+    /// A light would be brighter than numbers can tell.
+    #[error("light `{0}`: a weight above 1e20 is more than can be shown; set it lower")]
+    TooBright(String),
 }
 
 /// The mix of some lights: nominal where nothing is said; with any `only`, dark where nothing is.
 ///
 /// # Errors
-/// [`UnknownLight`].
+/// [`MixError`].
 pub fn mix(
     lights: &[SolutionLight],
     only: &[Setting],
     set: &[Setting],
-) -> Result<Vec<Rgb>, UnknownLight> {
+) -> Result<Vec<Rgb>, MixError> {
     let mut mix: Vec<Rgb> = lights
         .iter()
         .map(|light| {
@@ -131,11 +143,14 @@ pub fn mix(
         .collect();
     for setting in only.iter().chain(set) {
         let tag = lights.iter().position(|light| light.name == setting.light);
-        let tag = tag.ok_or_else(|| UnknownLight {
+        let tag = tag.ok_or_else(|| MixError::UnknownLight {
             name: setting.light.clone(),
             known: listed(lights),
         })?;
         mix[tag] = setting.value.weight(lights[tag].emission);
+        if mix[tag].max_channel() > LARGEST_WEIGHT {
+            return Err(MixError::TooBright(setting.light.clone()));
+        }
     }
     Ok(mix)
 }

@@ -3,7 +3,8 @@
 mod reach;
 
 use relume::mesh::{
-    Counts, Element, Face, Mesh, MeshError, MeshSink, Patch, Side, Spacing, subdivide,
+    Counts, Element, Face, Mesh, MeshError, MeshSink, Patch, Side, Spacing, element_count,
+    subdivide,
 };
 use relume::scene::Scene;
 
@@ -14,7 +15,7 @@ use crate::scene::OwnedScene;
 const DEFAULT_ELEMENTS: f32 = 8000.0;
 
 /// Elements, both sides counted, above which the default spacing gives way.
-const MOST_DEFAULT_ELEMENTS: u32 = 40_000;
+const MOST_DEFAULT_ELEMENTS: u64 = 40_000;
 
 /// Elements along the edge of a patch, by default.
 const ELEMENTS_PER_PATCH_EDGE: f32 = 4.0;
@@ -79,20 +80,14 @@ impl MeshSink for OwnedMesh {
 /// each, so that 8000 squares would cover them; slender triangles and small polygons make it more,
 /// so while there are over 40 000, both sides counted, the edge is lengthened by `sqrt 2`, as long as
 /// that saves a tenth of them. Patches: four elements long.
-///
-/// # Errors
-/// [`MeshError`] as [`subdivide`] reports it.
-pub fn spacing(
-    scene: &Scene,
-    patch: Option<f32>,
-    element: Option<f32>,
-) -> Result<Spacing, MeshError> {
+#[must_use]
+pub fn spacing(scene: &Scene, patch: Option<f32>, element: Option<f32>) -> Spacing {
     let of_element = |element: f32| Spacing {
         patch: patch.unwrap_or(element * ELEMENTS_PER_PATCH_EDGE),
         element,
     };
     if let Some(element) = element.or(patch.map(|length| length / ELEMENTS_PER_PATCH_EDGE)) {
-        return Ok(of_element(element));
+        return of_element(element);
     }
     let area: f32 = scene
         .surfaces()
@@ -101,41 +96,28 @@ pub fn spacing(
         .map(|surface| surface.polygon().area())
         .sum();
     // A scene of lamps alone has no elements to size.
-    let area = if area > 0.0 { area } else { 1.0 };
+    let area = if area > 0.0 {
+        area
+    } else {
+        scene.diagonal().powi(2)
+    };
     let mut chosen = of_element((area / DEFAULT_ELEMENTS).sqrt());
-    let mut count = count(scene, chosen)?;
-    while count > MOST_DEFAULT_ELEMENTS {
+    let mut count = count(scene, chosen);
+    while count > MOST_DEFAULT_ELEMENTS && chosen.element < scene.diagonal() {
         let longer = of_element(chosen.element * std::f32::consts::SQRT_2);
-        let fewer = self::count(scene, longer)?;
-        if fewer > count - count / 10 {
+        let fewer = self::count(scene, longer);
+        if fewer != u64::MAX && fewer > count - count / 10 {
             break;
         }
         (chosen, count) = (longer, fewer);
     }
-    Ok(chosen)
+    chosen
 }
 
-/// How many elements a division makes, both sides of everything counted.
-fn count(scene: &Scene, spacing: Spacing) -> Result<u32, MeshError> {
-    let counts = subdivide(scene, spacing, |_, _| true, &mut Discard)?;
-    Ok(counts.elements)
-}
-
-/// Takes everything and keeps nothing.
-struct Discard;
-
-impl MeshSink for Discard {
-    fn face(&mut self, _: Face) -> Result<(), MeshError> {
-        Ok(())
-    }
-
-    fn patch(&mut self, _: Patch) -> Result<(), MeshError> {
-        Ok(())
-    }
-
-    fn element(&mut self, _: Element) -> Result<(), MeshError> {
-        Ok(())
-    }
+/// How many elements a division makes, both sides of everything counted; without end when an edge
+/// would be cut too often.
+fn count(scene: &Scene, spacing: Spacing) -> u64 {
+    element_count(scene, spacing).unwrap_or(u64::MAX)
 }
 
 /// Divides the scene; faces that no light reaches are left out before anything is numbered.

@@ -70,7 +70,7 @@ pub fn reached_faces(
     bvh: &Bvh,
 ) -> Result<ReachedFaces, MeshError> {
     let mut parts = OwnedMesh::default();
-    let length = spacing.patch.max(super::spacing(scene, None, None)?.patch);
+    let length = spacing.patch.max(super::spacing(scene, None, None).patch);
     let coarse = Spacing {
         patch: length,
         element: length,

@@ -22,7 +22,7 @@ use crate::geometry::Polygon;
 use crate::scene::Emission;
 
 pub use storage::{MeshError, MeshSink, MeshStorage};
-pub use subdivide::{Counts, Spacing, is_face, subdivide};
+pub use subdivide::{Counts, Spacing, element_count, is_face, subdivide};
 
 /// Side of a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -56,6 +56,27 @@ pub fn subdivide(
     Ok(counts)
 }
 
+/// How many elements [`subdivide`] would make of all faces, without making them.
+///
+/// # Errors
+/// [`MeshError::TooFine`].
+pub fn element_count(scene: &Scene, spacing: Spacing) -> Result<u64, MeshError> {
+    let mut count = 0_u64;
+    for (surface, index) in scene.surfaces().iter().zip(0..) {
+        if surface.reflectance().is_black() {
+            continue;
+        }
+        let polygon = surface.polygon();
+        let too_fine = MeshError::TooFine { surface: index };
+        let elements = Grid::new(polygon, 1, spacing.patch)
+            .and_then(|patches| patches.refined(polygon, spacing.element))
+            .ok_or(too_fine)?;
+        let sides = if surface.is_two_sided() { 2 } else { 1 };
+        count += sides * u64::from(elements.cells(polygon.is_triangle()));
+    }
+    Ok(count)
+}
+
 /// True for the front of every surface, and for the back of a two-sided one.
 #[must_use]
 pub fn is_face(surface: &Surface, side: Side) -> bool {
