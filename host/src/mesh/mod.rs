@@ -164,7 +164,7 @@ mod tests {
     use super::*;
     use glam::Vec3;
     use relume::color::Rgb;
-    use relume::scene::{Emission, Surface};
+    use relume::scene::{Emission, Falloff, Luminaire, Source, Surface};
 
     fn surface(vertices: [Vec3; 4], reflectance: f32) -> Surface {
         Surface::new(0, &vertices, Rgb::splat(reflectance)).unwrap()
@@ -191,6 +191,47 @@ mod tests {
                 }
             })
             .collect()
+    }
+
+    /// A closed room with a floating box in each octant, lit by one narrow spot.
+    #[test]
+    fn a_small_pool_of_light_reaches_every_open_side_and_no_closed_one() {
+        let octants = (0..8).map(|i| {
+            let sign = |bit: i32| if i >> bit & 1 == 0 { -1.0 } else { 1.0 };
+            Vec3::new(sign(0), sign(1), sign(2)) * 1.1
+        });
+        let boxes = octants.flat_map(|at| walls(at, 0.3));
+        let surfaces: Vec<Surface> = walls(Vec3::ZERO, 2.0)
+            .into_iter()
+            .chain(boxes)
+            .map(|wall| surface(wall, 0.7).two_sided())
+            .collect();
+        let scene = OwnedScene {
+            surfaces,
+            ..OwnedScene::default()
+        };
+        for outer in [0.015, 0.09, 1.0] {
+            let source = Source::Spot {
+                position: Vec3::new(0.1, 1.7, 0.2),
+                direction: -Vec3::Y,
+                inner: 0.0,
+                outer,
+                falloff: Falloff::Smooth,
+            };
+            let spot = [Luminaire::new(0, Rgb::WHITE, source).unwrap()];
+            let view = Scene::new(&scene.surfaces, &spot, 1).unwrap();
+            let spacing = super::spacing(&view, None, None);
+            let mesh = build(&scene, &view, spacing, &Bvh::for_scene(&view)).unwrap();
+            // Walls face inwards: fronts of the room and backs of the boxes are lit.
+            let found: Vec<(u32, Side)> = mesh.faces.iter().map(|f| (f.surface, f.side)).collect();
+            let room = (0..6).map(|surface| (surface, Side::Front));
+            let boxes = (6..54).map(|surface| (surface, Side::Back));
+            assert_eq!(
+                found,
+                room.chain(boxes).collect::<Vec<_>>(),
+                "outer {outer}"
+            );
+        }
     }
 
     /// A two-sided room with a small lamp and a closed box inside: only the room's inside and the

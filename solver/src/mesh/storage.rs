@@ -81,6 +81,10 @@ pub trait MeshSink {
 /// ```compile_fail
 /// let storage = relume::mesh::MeshStorage::<12, 65_537, 960>::new();
 /// ```
+///
+/// ```
+/// let storage = relume::mesh::MeshStorage::<12, 68, 960>::new();
+/// ```
 #[derive(Debug)]
 pub struct MeshStorage<const FACES: usize, const PATCHES: usize, const ELEMENTS: usize> {
     faces: Vec<Face, FACES>,

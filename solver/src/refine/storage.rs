@@ -67,6 +67,10 @@ pub struct Storage<'a, const K: usize> {
 /// ```compile_fail
 /// let storage = relume::refine::FixedStorage::<3, 60, 960, 61>::new();
 /// ```
+///
+/// ```
+/// let storage = relume::refine::FixedStorage::<3, 60, 960, 60>::new();
+/// ```
 #[derive(Debug)]
 pub struct FixedStorage<
     const K: usize,
