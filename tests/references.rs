@@ -112,9 +112,9 @@ fn monte_carlo_agrees_with_the_dense_solution() {
             }
         }
         // What is left after the noise is the substructuring error of 1 m patches: the solver
-        // notes measured 3 to 4 % for a median light, and 15 to 24 % for one in a corner.
+        // notes measured 3 to 4 % for a median light; here it is 2.3 to 4.6 %.
         let error = ((difference - variance).max(0.0) / norm).sqrt();
-        assert!(error < 0.1, "light {light}: {error:.3} beyond the noise");
+        assert!(error < 0.06, "light {light}: {error:.3} beyond the noise");
     }
 }
 
@@ -153,6 +153,7 @@ fn a_fine_cornell_box_agrees_with_monte_carlo() {
             }
         }
         let error = ((difference - variance).max(0.0) / norm).sqrt();
-        assert!(error < 0.05, "{}: {error:.3} beyond the noise", light.name);
+        // Measured: 2.0 to 2.8 %, from substructuring and from shadows sampled by 16 rays.
+        assert!(error < 0.04, "{}: {error:.3} beyond the noise", light.name);
     }
 }
