@@ -9,7 +9,7 @@ use relume::form_factor;
 use relume_host::builtin::{Builtin, cornell_box};
 use relume_host::bvh::Bvh;
 use relume_host::reference::dense::{DenseLight, DenseSolution, DenseSystem};
-use relume_host::reference::path_trace::{PathTracer, Receiver};
+use relume_host::reference::path_trace::{Estimate, PathTracer, Receiver};
 use relume_host::solution::Solution;
 
 /// The dense `f64` solution of the same mesh and form factors; area lights only.
@@ -80,14 +80,15 @@ fn refinement_converges_to_the_dense_solution() {
     }
 }
 
-#[test]
-fn monte_carlo_agrees_with_the_dense_solution() {
-    let room = room();
-    let solution = baked(&room.scene, &exact(&room));
-    let reference = dense(&room, &solution);
+/// Path-traced averages over the chosen elements, `[chosen][light]`.
+fn traced(
+    builtin: &Builtin,
+    solution: &Solution,
+    chosen: &[usize],
+    samples: u32,
+    seed: u64,
+) -> Vec<Vec<Estimate>> {
     let mesh = solution.mesh.view();
-    // Every 16th element: a sixteenth of the room, in every corner of it.
-    let chosen: Vec<usize> = (0..mesh.elements.len()).step_by(16).collect();
     let receivers: Vec<Receiver> = chosen
         .iter()
         .map(|number| {
@@ -98,8 +99,19 @@ fn monte_carlo_agrees_with_the_dense_solution() {
             Receiver::polygon(&vertices).expect("it has an area")
         })
         .collect();
-    let tracer = PathTracer::new(&room.scene).expect("a legal scene");
-    let estimates = tracer.estimate(&receivers, 4000, 1);
+    let tracer = PathTracer::new(&builtin.scene).expect("a legal scene");
+    tracer.estimate(&receivers, samples, seed)
+}
+
+#[test]
+fn monte_carlo_agrees_with_the_dense_solution() {
+    let room = room();
+    let solution = baked(&room.scene, &exact(&room));
+    let reference = dense(&room, &solution);
+    let mesh = solution.mesh.view();
+    // Every 16th element: a sixteenth of the room, in every corner of it.
+    let chosen: Vec<usize> = (0..mesh.elements.len()).step_by(16).collect();
+    let estimates = traced(&room, &solution, &chosen, 4000, 1);
     for light in 0..solution.lights.len() {
         let (mut difference, mut variance, mut norm) = (0.0, 0.0, 0.0);
         for (number, estimates) in chosen.iter().zip(&estimates) {
@@ -126,18 +138,7 @@ fn a_fine_cornell_box_agrees_with_monte_carlo() {
     let solution = baked(&builtin.scene, &exact(&builtin));
     let mesh = solution.mesh.view();
     let chosen: Vec<usize> = (0..mesh.elements.len()).step_by(41).collect();
-    let receivers: Vec<Receiver> = chosen
-        .iter()
-        .map(|number| {
-            let outline = mesh
-                .element_polygon(&mesh.elements[*number])
-                .expect("it is there");
-            let vertices: Vec<DVec3> = outline.vertices().iter().map(|v| v.as_dvec3()).collect();
-            Receiver::polygon(&vertices).expect("it has an area")
-        })
-        .collect();
-    let tracer = PathTracer::new(&builtin.scene).expect("a legal scene");
-    let estimates = tracer.estimate(&receivers, 2000, 7);
+    let estimates = traced(&builtin, &solution, &chosen, 2000, 7);
     for (light, tag) in solution.lights.iter().zip(0..) {
         let (mut difference, mut variance, mut norm) = (0.0, 0.0, 0.0);
         for (number, estimates) in chosen.iter().zip(&estimates) {

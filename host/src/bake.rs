@@ -11,7 +11,7 @@ use relume::form_factor::{self, Shooter};
 use relume::luminaire;
 use relume::mesh::{Mesh, MeshError, Spacing};
 use relume::refine::{Block, PatchState, RefineError, Refinement, Storage};
-use relume::scene::{Scene, SceneError};
+use relume::scene::{Luminaire, Scene, SceneError};
 use relume::visibility::{Occluders, Visibility};
 use thiserror::Error;
 
@@ -179,26 +179,14 @@ pub fn bake(
 
 /// Fills rows, one after the other, from one thread or many.
 trait RowFiller {
-    fn luminaire(
-        &self,
-        mesh: &Mesh,
-        luminaire: &relume::scene::Luminaire,
-        far: f32,
-        row: &mut [f32],
-    );
+    fn luminaire(&self, mesh: &Mesh, luminaire: &Luminaire, far: f32, row: &mut [f32]);
     fn patch(&self, mesh: &Mesh, patch: u32, row: &mut [f32]);
 }
 
 struct Serial<'a>(Occluders<'a>);
 
 impl RowFiller for Serial<'_> {
-    fn luminaire(
-        &self,
-        mesh: &Mesh,
-        luminaire: &relume::scene::Luminaire,
-        far: f32,
-        row: &mut [f32],
-    ) {
+    fn luminaire(&self, mesh: &Mesh, luminaire: &Luminaire, far: f32, row: &mut [f32]) {
         luminaire::fill(mesh, luminaire, far, 0, &self.0, row);
     }
 
@@ -210,13 +198,7 @@ impl RowFiller for Serial<'_> {
 struct Parallel<'a, V>(&'a V);
 
 impl<V: Visibility + Sync> RowFiller for Parallel<'_, V> {
-    fn luminaire(
-        &self,
-        mesh: &Mesh,
-        luminaire: &relume::scene::Luminaire,
-        far: f32,
-        row: &mut [f32],
-    ) {
+    fn luminaire(&self, mesh: &Mesh, luminaire: &Luminaire, far: f32, row: &mut [f32]) {
         in_chunks(row, |first, part| {
             luminaire::fill(mesh, luminaire, far, first, self.0, part);
         });
