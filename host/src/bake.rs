@@ -5,26 +5,22 @@
 
 use std::ops::ControlFlow;
 
-use rayon::prelude::*;
 use relume::color::Rgb;
-use relume::form_factor::{self, Shooter};
 use relume::luminaire;
 use relume::mesh::{Mesh, MeshError, Spacing};
 use relume::refine::{Block, PatchState, RefineError, Refinement, Storage};
-use relume::scene::{Luminaire, Scene, SceneError};
-use relume::visibility::{Occluders, Visibility};
+use relume::scene::{Scene, SceneError};
+use relume::visibility::Occluders;
 use thiserror::Error;
 
 use crate::bvh::Bvh;
 use crate::mesh::{self, OwnedMesh};
+use crate::rows::{Parallel, RowFiller, Serial};
 use crate::scene::OwnedScene;
 use crate::solution::{Solution, SolutionLight};
 
 /// Lanes of a block of lights on the host.
 const LANES: usize = 8;
-
-/// Receivers that one task fills.
-const CHUNK: usize = 64;
 
 /// Most bytes of state, and most bytes of kept rows, that a bake takes.
 const STATE_BYTES: usize = 6 << 30;
@@ -158,7 +154,7 @@ pub fn bake(
             &mut refinement,
             &view,
             mesh.view(),
-            &Parallel(&bvh),
+            &Parallel::new(&mesh.view(), &bvh),
             settings,
             watch,
         )?,
@@ -175,53 +171,6 @@ pub fn bake(
         }
     }
     Ok(solution(scene, settings, spacing, &mesh, &refinement))
-}
-
-/// Fills rows, one after the other, from one thread or many.
-trait RowFiller {
-    fn luminaire(&self, mesh: &Mesh, luminaire: &Luminaire, far: f32, row: &mut [f32]);
-    fn patch(&self, mesh: &Mesh, patch: u32, row: &mut [f32]);
-}
-
-struct Serial<'a>(Occluders<'a>);
-
-impl RowFiller for Serial<'_> {
-    fn luminaire(&self, mesh: &Mesh, luminaire: &Luminaire, far: f32, row: &mut [f32]) {
-        luminaire::fill(mesh, luminaire, far, 0, &self.0, row);
-    }
-
-    fn patch(&self, mesh: &Mesh, patch: u32, row: &mut [f32]) {
-        form_factor::row(mesh, patch, &self.0, row);
-    }
-}
-
-struct Parallel<'a, V>(&'a V);
-
-impl<V: Visibility + Sync> RowFiller for Parallel<'_, V> {
-    fn luminaire(&self, mesh: &Mesh, luminaire: &Luminaire, far: f32, row: &mut [f32]) {
-        in_chunks(row, |first, part| {
-            luminaire::fill(mesh, luminaire, far, first, self.0, part);
-        });
-    }
-
-    fn patch(&self, mesh: &Mesh, patch: u32, row: &mut [f32]) {
-        let Some(polygon) = mesh.patch_polygon(patch) else {
-            row.fill(0.0);
-            return;
-        };
-        let shooter = Shooter::new(polygon);
-        in_chunks(row, |first, part| {
-            form_factor::fill(mesh, &shooter, first, self.0, part);
-        });
-        form_factor::conserve(mesh, polygon.area(), row);
-    }
-}
-
-/// Every value depends on its own receiver alone, so the split does not change the bits.
-fn in_chunks(row: &mut [f32], fill: impl Fn(u32, &mut [f32]) + Sync) {
-    row.par_chunks_mut(CHUNK)
-        .enumerate()
-        .for_each(|(index, part)| fill((index * CHUNK) as u32, part));
 }
 
 /// Direct light of the luminaires, then rows until the residual, the shots or the watcher ends it.

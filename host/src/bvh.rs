@@ -16,7 +16,7 @@ use obvhs::{Boundable, BvhBuildParams};
 use relume::geometry::Polygon;
 use relume::luminaire;
 use relume::scene::{Scene, Source, Surface};
-use relume::visibility::Visibility;
+use relume::visibility::{Bounds, Shaft, Visibility};
 
 /// Surfaces in a tree of boxes.
 pub struct Bvh {
@@ -130,6 +130,68 @@ impl Bvh {
     }
 }
 
+impl Bvh {
+    /// The surfaces that a shaft admits, as `(number, outline)` in the order of their numbers.
+    fn admitted(&self, shaft: &Shaft) -> Vec<(u32, &Polygon)> {
+        let mut found = Vec::new();
+        let mut waiting: Vec<usize> = Vec::with_capacity(64);
+        waiting.extend((!self.tree.nodes.is_empty()).then_some(0));
+        while let Some(node) = waiting.pop() {
+            let node = &self.tree.nodes[node];
+            let bounds = Bounds {
+                low: node.aabb.min.into(),
+                high: node.aabb.max.into(),
+            };
+            if shaft.misses(bounds) {
+                continue;
+            }
+            let first = node.first_index as usize;
+            if node.is_leaf() {
+                let leaf = first..first + node.prim_count as usize;
+                let leaf = self.surfaces[leaf.clone()].iter().zip(&self.polygons[leaf]);
+                found.extend(
+                    leaf.filter(|(_, polygon)| shaft.admits(polygon))
+                        .map(|(surface, polygon)| (*surface, polygon)),
+                );
+            } else {
+                waiting.extend([first, first + 1]);
+            }
+        }
+        found.sort_unstable_by_key(|(surface, _)| *surface);
+        found
+    }
+
+    /// What stands between two regions, looked up once for many pairs of points in them.
+    #[must_use]
+    pub fn narrowed(&self, shaft: &Shaft) -> Narrowed<'_> {
+        let found = self.admitted(shaft);
+        Narrowed {
+            bvh: self,
+            blockers: found.into_iter().map(|(_, polygon)| polygon).collect(),
+        }
+    }
+}
+
+/// The few surfaces of a tree that can stand between two regions.
+#[derive(Debug)]
+pub struct Narrowed<'a> {
+    bvh: &'a Bvh,
+    blockers: Vec<&'a Polygon>,
+}
+
+impl Visibility for Narrowed<'_> {
+    fn sees(&self, from: Vec3, to: Vec3) -> bool {
+        self.bvh.sees(from, to)
+    }
+
+    fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(&'v Polygon)) {
+        let blockers = self.blockers.iter().copied();
+        blockers
+            .filter(|polygon| shaft.admits(polygon))
+            .for_each(visit);
+    }
+}
+
 impl Visibility for Bvh {
     fn sees(&self, from: Vec3, to: Vec3) -> bool {
         self.tree.ray_traverse_miss(segment(from, to), |_, index| {
@@ -138,6 +200,12 @@ impl Visibility for Bvh {
                 None => f32::INFINITY,
             }
         })
+    }
+
+    fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(&'v Polygon)) {
+        for (_, polygon) in self.admitted(shaft) {
+            visit(polygon);
+        }
     }
 }
 

@@ -21,6 +21,7 @@ pub mod mesh;
 pub mod solution;
 
 pub mod bake;
+pub mod rows;
 
 pub mod picture;
 

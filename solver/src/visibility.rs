@@ -1,16 +1,25 @@
-//! Who sees whom: a trait, and the brute-force answer over all surfaces.
+//! Who sees whom: a trait, the brute-force answer over all surfaces, and the shaft between two polygons.
+//!
+//! The shaft is the convex hull of the boxes of a receiver and a shooter, bounded by planes that
+//! touch an edge of each (Haines and Wallace 1991, shaft culling). What lies outside it, behind one of the
+//! two, or in a plane that has both on one side, hides nothing of one from the other.
 //!
 //! Assumption: every surface blocks light from both sides; end points lie on surfaces or in free
 //! space. A surface that contains an end point (to within rounding) does not hide it.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
+use heapless::Vec;
 
+use crate::geometry::Polygon;
 use crate::scene::Surface;
 
-/// Tells whether two points see each other.
+/// Tells who stands between two points or two polygons.
 pub trait Visibility {
     /// True when no surface crosses the open segment between the two points.
     fn sees(&self, from: Vec3, to: Vec3) -> bool;
+
+    /// Visits every surface that [`Shaft::admits`], in the order of their numbers.
+    fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(&'v Polygon));
 }
 
 /// Every surface of a scene, asked one after the other: work grows with their number.
@@ -27,6 +36,181 @@ impl Visibility for Occluders<'_> {
             .iter()
             .any(|surface| surface.polygon().crossing(from, to).is_some())
     }
+
+    fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(&'v Polygon)) {
+        self.0
+            .iter()
+            .map(Surface::polygon)
+            .filter(|polygon| shaft.admits(polygon))
+            .for_each(visit);
+    }
+}
+
+/// An axis-parallel box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Smallest coordinates.
+    pub low: Vec3,
+    /// Largest coordinates.
+    pub high: Vec3,
+}
+
+impl Bounds {
+    /// The box of a polygon.
+    #[must_use]
+    pub fn of(polygon: &Polygon) -> Self {
+        let origin = polygon.origin();
+        let nothing = Self {
+            low: origin,
+            high: origin,
+        };
+        polygon.vertices().iter().fold(nothing, |bounds, v| Self {
+            low: bounds.low.min(*v),
+            high: bounds.high.max(*v),
+        })
+    }
+
+    /// The same box, larger by `margin` on every side.
+    #[must_use]
+    pub fn widened(self, margin: f32) -> Self {
+        Self {
+            low: self.low - margin,
+            high: self.high + margin,
+        }
+    }
+
+    /// The smallest box around both.
+    fn with(self, other: Self) -> Self {
+        Self {
+            low: self.low.min(other.low),
+            high: self.high.max(other.high),
+        }
+    }
+
+    fn overlaps(self, other: Self) -> bool {
+        self.low.cmple(other.high).all() && other.low.cmple(self.high).all()
+    }
+
+    /// The corner that is largest along axis `i` where `high` says so.
+    fn corner(self, [i, j]: [usize; 2], [high_i, high_j]: [bool; 2]) -> Vec2 {
+        let end = |axis, high| component(if high { self.high } else { self.low }, axis);
+        Vec2::new(end(i, high_i), end(j, high_j))
+    }
+}
+
+const fn component(v: Vec3, axis: usize) -> f32 {
+    match axis {
+        0 => v.x,
+        1 => v.y,
+        _ => v.z,
+    }
+}
+
+/// A wall of a shaft, parallel to the third axis: outside is where `normal . (p - at) > 0`.
+#[derive(Clone, Copy, Debug)]
+struct Wall {
+    axes: [usize; 2],
+    normal: Vec2,
+    at: Vec2,
+}
+
+impl Wall {
+    /// True when the whole box is outside.
+    fn excludes(&self, bounds: Bounds) -> bool {
+        let nearest = bounds.corner(self.axes, [self.normal.x < 0.0, self.normal.y < 0.0]);
+        self.normal.dot(nearest - self.at) > 0.0
+    }
+}
+
+/// The space in which a surface can stand between two polygons.
+#[derive(Clone, Debug)]
+pub struct Shaft {
+    receiver: Polygon,
+    shooter: Polygon,
+    around: Bounds,
+    walls: Vec<Wall, 12>,
+}
+
+impl Shaft {
+    /// The shaft between two polygons.
+    #[must_use]
+    pub fn new(receiver: Polygon, shooter: Polygon) -> Self {
+        Self::with_margin(receiver, shooter, 0.0)
+    }
+
+    /// A shaft that holds all the shafts between points within `margin` of the two polygons, m.
+    #[must_use]
+    pub fn with_margin(receiver: Polygon, shooter: Polygon, margin: f32) -> Self {
+        let (a, b) = (
+            Bounds::of(&receiver).widened(margin),
+            Bounds::of(&shooter).widened(margin),
+        );
+        let walls = [[0, 1], [1, 2], [2, 0]].into_iter().flat_map(|axes| {
+            let ends = [[false, false], [false, true], [true, false], [true, true]];
+            ends.into_iter()
+                .filter_map(move |end| wall(a, b, axes, end))
+        });
+        Self {
+            receiver,
+            shooter,
+            around: a.with(b),
+            walls: walls.collect(),
+        }
+    }
+
+    /// True when nothing inside the box can be in the shaft.
+    #[must_use]
+    pub fn misses(&self, bounds: Bounds) -> bool {
+        !self.around.overlaps(bounds) || self.walls.iter().any(|wall| wall.excludes(bounds))
+    }
+
+    /// True when the surface may hide a part of one polygon from a part of the other.
+    #[must_use]
+    pub fn admits(&self, surface: &Polygon) -> bool {
+        let in_front = |of: &Polygon| {
+            surface.vertices().iter().any(|v| {
+                let (height, tolerance) = of.height(*v);
+                height > tolerance
+            })
+        };
+        let separates = || {
+            let ends = self.receiver.vertices().iter();
+            let (mut above, mut below) = (false, false);
+            for end in ends.chain(self.shooter.vertices()) {
+                let (height, tolerance) = surface.height(*end);
+                above |= height > tolerance;
+                below |= height < -tolerance;
+            }
+            above && below
+        };
+        !self.misses(Bounds::of(surface))
+            && in_front(&self.receiver)
+            && in_front(&self.shooter)
+            && separates()
+    }
+}
+
+/// The wall between the corners of two boxes, seen along the third axis, when all of both is on one
+/// side of it: one box must reach further along the first axis and the other along the second.
+fn wall(a: Bounds, b: Bounds, axes: [usize; 2], end: [bool; 2]) -> Option<Wall> {
+    let (from, to) = (a.corner(axes, end), b.corner(axes, end));
+    let outwards = Vec2::from(end.map(|high| if high { 1.0 } else { -1.0 }));
+    let lead = (to - from) * outwards;
+    if lead.x * lead.y >= 0.0 {
+        return None;
+    }
+    // At right angles to the line through both corners, towards the outside.
+    let normal = (to - from).perp();
+    let normal = if normal.dot(outwards) < 0.0 {
+        -normal
+    } else {
+        normal
+    };
+    Some(Wall {
+        axes,
+        normal,
+        at: from,
+    })
 }
 
 #[cfg(test)]

@@ -38,6 +38,9 @@ const GLANCES: u64 = 4;
 /// Rays that light casts from each luminaire, and from each patch of a lamp.
 const CASTS: u64 = 64;
 
+/// Form factor of what rounding leaves between blockers that share an edge.
+const SLIVER: f32 = 1e-6;
+
 /// By how much a point is drawn from its polygon's outline towards the middle, away from edges.
 const INWARDS: f32 = 1e-4;
 
@@ -193,7 +196,7 @@ impl<'a> Surroundings<'a> {
         let luminaires = self.scene.luminaires();
         self.shooters
             .iter()
-            .any(|lamp| lamp.form_factor(polygon, self.bvh) > 0.0)
+            .any(|lamp| lamp.form_factor(polygon, self.bvh) > SLIVER)
             || luminaires
                 .iter()
                 .any(|l| luminaire::irradiance(l.source(), polygon, self.far, self.bvh) > 0.0)

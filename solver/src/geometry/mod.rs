@@ -19,8 +19,8 @@ pub use sample::{SamplePoint, from_unit_square, gauss_points};
 /// Most vertices that a polygon may have.
 pub const MAX_VERTICES: usize = 4;
 
-/// A polygon that was clipped by a plane or two.
-pub type Clipped = Vec<Vec3, 8>;
+/// A polygon that was clipped by a few planes.
+pub type Clipped = Vec<Vec3, 10>;
 
 /// Roundings that a point's coordinates may carry when its side of a plane is decided.
 const ROUNDINGS: f32 = 8.0 * f32::EPSILON;
@@ -304,7 +304,7 @@ fn longest_edge(vertices: &[Vec3]) -> f32 {
 
 /// The part of a convex outline where `height` is not negative; empty when nothing is left.
 ///
-/// `height` must be linear (a signed distance to a plane). Outlines of more than seven vertices
+/// `height` must be linear (a signed distance to a plane). Outlines of more than nine vertices
 /// lose what does not fit into [`Clipped`].
 #[must_use]
 pub fn clip(outline: &[Vec3], height: impl Fn(Vec3) -> f32) -> Clipped {
