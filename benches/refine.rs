@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use criterion::{BenchmarkId, Criterion, Throughput};
 use relume::color::Rgb;
 use relume::mesh::Mesh;
-use relume::refine::{Block, Lanes, PatchState, Refinement, Storage};
+use relume::refine::{Block, Lanes, PatchState, Refinement, RowStorage, Storage};
 use relume::scene::{Emission, Surface};
 use relume_host::bake::Settings;
 use relume_host::builtin::PaperLamps;
@@ -109,7 +109,7 @@ impl<const K: usize> Memory<K> {
             unshot: &mut self.unshot,
             patches: &mut self.patches,
             blocks: &mut self.blocks,
-            rows: &mut [],
+            rows: RowStorage::default(),
         }
     }
 }

@@ -17,7 +17,7 @@ use relume::color::Rgb;
 use relume::draw::{Sample, Shown, paint};
 use relume::form_factor;
 use relume::mesh::{MeshStorage, subdivide};
-use relume::refine::{FixedStorage, Refinement};
+use relume::refine::{Choice, FixedStorage, Refinement};
 use relume::relight::{FixedMix, change_fixed, relight_fixed};
 use relume::scene::Scene;
 use relume::tone::{Exposure, radiance};
@@ -47,6 +47,7 @@ fn bake_and_pack(flash: &mut [u8]) -> usize {
     let mut memory = MEMORY.lock().expect("one user");
     let mut refinement =
         Refinement::new(mesh, scene.lights(), 1e-2, memory.storage()).expect("it fits");
+    refinement.set_choice(Choice::Power);
     let mut row = [0.0; ELEMENTS];
     while let Some(patch) = refinement.next_shooter() {
         form_factor::row(&mesh, patch, &Occluders(surfaces), &mut row);

@@ -8,13 +8,13 @@ use std::ops::ControlFlow;
 use relume::color::Rgb;
 use relume::luminaire;
 use relume::mesh::{Mesh, MeshError, Spacing};
-use relume::refine::{Block, PatchState, RefineError, Refinement, Storage};
+use relume::refine::{Block, Choice, PatchState, RefineError, Refinement, RowStorage, Storage};
 use relume::scene::{Scene, SceneError};
 use relume::visibility::Occluders;
 use thiserror::Error;
 
 use crate::bvh::Bvh;
-use crate::mesh::{self, OwnedMesh};
+use crate::mesh::{self, Direct, OwnedMesh, Split, split};
 use crate::rows::{Parallel, RowFiller, Serial};
 use crate::scene::OwnedScene;
 use crate::solution::{Solution, SolutionLight};
@@ -25,6 +25,12 @@ const LANES: usize = 8;
 /// Most bytes of state, and most bytes of kept rows, that a bake takes.
 const STATE_BYTES: usize = 6 << 30;
 const ROW_BYTES: usize = 4 << 30;
+
+/// Most bytes of lamps' rows that are held before the refinement starts.
+const LAMP_BYTES: usize = 1 << 30;
+
+/// Most shooters that patches are divided into, for each of them.
+const SHOOTERS_PER_PATCH: usize = 3;
 
 /// Who evaluates the rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -56,6 +62,8 @@ pub struct Settings {
     pub element: Option<f32>,
     /// Residual to reach, above zero.
     pub residual: f32,
+    /// Variation of direct light inside a patch, relative, above which patches are divided.
+    pub variation: f64,
     /// Stop after so many distinct rows, or so many shots of a plain refinement.
     pub shots: Option<u32>,
     /// As published: no row is kept and no ambient term is added.
@@ -72,6 +80,7 @@ impl Default for Settings {
             patch: None,
             element: None,
             residual: 1e-4,
+            variation: 0.15,
             shots: None,
             plain: false,
             split_direct: false,
@@ -139,83 +148,163 @@ pub fn bake(
     let spacing = mesh::spacing(&view, settings.patch, settings.element);
     let bvh = Bvh::for_scene(&view);
     let mesh = mesh::build(scene, &view, spacing, &bvh)?;
-    let mut memory = Memory::new(&mesh, scene.lights.len(), settings)?;
-    let mut refinement = Refinement::<LANES>::new(
-        mesh.view(),
-        view.lights(),
-        settings.residual,
-        memory.storage(),
-    )?;
+    let patches = mesh.patches.len();
+    match settings.method {
+        Method::Host => {
+            let rows = |mesh: &Mesh| Parallel::new(mesh, &bvh);
+            refine(scene, &view, mesh, rows, settings, watch)
+        }
+        Method::Device => {
+            let rows = |_: &Mesh| Serial(Occluders(&scene.surfaces));
+            refine(scene, &view, mesh, rows, settings, watch)
+        }
+    }
+    .map(|solved| solution(scene, spacing, patches, solved))
+}
+
+/// What a refinement leaves behind.
+struct Solved {
+    mesh: OwnedMesh,
+    contributions: Vec<Rgb>,
+    direct: Option<Vec<Rgb>>,
+    residuals: Vec<f32>,
+    rows: u32,
+}
+
+/// Direct light, shooters where it varies, then rows until the residual, the shots or the watcher ends it.
+fn refine<F: RowFiller>(
+    scene: &OwnedScene,
+    view: &Scene,
+    mesh: OwnedMesh,
+    filler: impl Fn(&Mesh) -> F,
+    settings: &Settings,
+    watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+) -> Result<Solved, BakeError> {
+    let lights = scene.lights.len();
+    let light = DirectLight::evaluate(view, &mesh, &filler(&mesh.view()), settings, watch);
+    let mut first: Vec<u32> = (0..mesh.patches.len() as u32).collect();
+    let mut mesh = mesh;
+    if light.is_complete && !settings.plain {
+        let irradiance = light.by_element(view, &mesh);
+        let irradiance = irradiance.as_slice();
+        let direct = Direct { irradiance, lights };
+        let budget = SHOOTERS_PER_PATCH * mesh.patches.len();
+        Split { mesh, first, .. } = split(&mesh, direct, settings.variation, budget);
+    }
+
+    let mut memory = Memory::new(&mesh, lights, settings)?;
+    let storage = memory.storage();
+    let goal = settings.residual;
+    let mut refinement = Refinement::<LANES>::new(mesh.view(), view.lights(), goal, storage)?;
+    if settings.plain {
+        refinement.set_choice(Choice::Power);
+    }
     for (light, tag) in scene.lights.iter().zip(0..) {
         refinement.set_importance(tag, light.importance)?;
     }
-    match settings.method {
-        Method::Host => refine(
-            &mut refinement,
-            &view,
-            mesh.view(),
-            &Parallel::new(&mesh.view(), &bvh),
-            settings,
-            watch,
-        )?,
-        Method::Device => {
-            let serial = Serial(Occluders(&scene.surfaces));
-            refine(
-                &mut refinement,
-                &view,
-                mesh.view(),
-                &serial,
-                settings,
-                watch,
-            )?;
-        }
+    for (luminaire, row) in view.luminaires().iter().zip(&light.luminaires) {
+        refinement.illuminate(luminaire.light(), luminaire.share(), row)?;
     }
-    Ok(solution(scene, settings, spacing, &mesh, &refinement))
-}
-
-/// Direct light of the luminaires, then rows until the residual, the shots or the watcher ends it.
-fn refine(
-    refinement: &mut Refinement<LANES>,
-    scene: &Scene,
-    mesh: Mesh,
-    filler: &impl RowFiller,
-    settings: &Settings,
-    watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
-) -> Result<(), BakeError> {
+    for (patch, row) in &light.lamps {
+        refinement.shoot(first[*patch as usize], row)?;
+    }
+    drop(light);
+    let filler = filler(&mesh.view());
     let mut row = vec![0.0; mesh.elements.len()];
-    let far = luminaire::far(scene);
-    for luminaire in scene.luminaires() {
-        filler.luminaire(&mesh, luminaire, far, &mut row);
-        refinement.illuminate(luminaire.light(), luminaire.share(), &row)?;
-    }
-    // Asking for the next shooter shoots known rows, so both ways to stop come after it: a bake
-    // that is interrupted gives the bits of one that was told to stop there.
     while let Some(patch) = refinement.next_shooter() {
-        if settings
-            .shots
-            .is_some_and(|limit| refinement.rows_evaluated() >= limit)
+        let rows = refinement.rows_evaluated();
+        if settings.shots.is_some_and(|limit| rows >= limit)
+            || watch(progress(rows, &mesh, refinement.residual())).is_break()
         {
             break;
         }
-        let progress = Progress {
-            rows: refinement.rows_evaluated(),
-            patches: mesh.patches.len(),
-            residual: refinement.residual(),
-        };
-        if watch(progress).is_break() {
-            break;
-        }
-        filler.patch(&mesh, patch, &mut row);
+        filler.patch(&mesh.view(), patch, &mut row);
         refinement.shoot(patch, &row)?;
     }
-    // A wish to stop that came while known rows were shot is heard here.
-    let _ = watch(Progress {
-        rows: refinement.rows_evaluated(),
-        patches: mesh.patches.len(),
-        residual: refinement.residual(),
-    });
     refinement.finish();
-    Ok(())
+    Ok(read_out(&mesh, lights, settings, &refinement))
+}
+
+fn progress(rows: u32, mesh: &OwnedMesh, residual: f32) -> Progress {
+    Progress {
+        rows,
+        patches: mesh.patches.len(),
+        residual,
+    }
+}
+
+/// Rows of all that emits.
+struct DirectLight {
+    /// Direct irradiance by each luminaire of the scene.
+    luminaires: Vec<Vec<f32>>,
+    /// Emitting patches and their rows, as many as the shots allow.
+    lamps: Vec<(u32, Vec<f32>)>,
+    /// True when no lamp is missing.
+    is_complete: bool,
+}
+
+impl DirectLight {
+    fn evaluate(
+        scene: &Scene,
+        mesh: &OwnedMesh,
+        filler: &impl RowFiller,
+        settings: &Settings,
+        watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Self {
+        let view = mesh.view();
+        let n = mesh.elements.len();
+        let far = luminaire::far(scene);
+        let luminaires = scene.luminaires().iter().map(|luminaire| {
+            let mut row = vec![0.0; n];
+            filler.luminaire(&view, luminaire, far, &mut row);
+            row
+        });
+        let mut light = Self {
+            luminaires: luminaires.collect(),
+            lamps: Vec::new(),
+            is_complete: false,
+        };
+        // As published, and where the rows of the lamps are too many to be held twice, they are
+        // shot like any other.
+        let emitting = (0..mesh.patches.len() as u32).filter(|p| view.patch_emission(*p).is_some());
+        if settings.plain || emitting.clone().count() * n * 4 > LAMP_BYTES {
+            return light;
+        }
+        for patch in emitting {
+            let rows = light.lamps.len() as u32;
+            if settings.shots.is_some_and(|limit| rows >= limit)
+                || watch(progress(rows, mesh, 1.0)).is_break()
+            {
+                return light;
+            }
+            let mut row = vec![0.0; n];
+            filler.patch(&view, patch, &mut row);
+            light.lamps.push((patch, row));
+        }
+        light.is_complete = true;
+        light
+    }
+
+    /// Sum over the channels of the direct irradiance, element by element, light by light.
+    fn by_element(&self, scene: &Scene, mesh: &OwnedMesh) -> Vec<f32> {
+        let view = mesh.view();
+        let lights = scene.lights() as usize;
+        let mut irradiance = vec![0.0; mesh.elements.len() * lights];
+        let luminaires = scene.luminaires().iter().zip(&self.luminaires);
+        let luminaires = luminaires.map(|(l, row)| (l.light(), l.share(), row));
+        let lamps = self.lamps.iter().filter_map(|(patch, row)| {
+            let emission = view.patch_emission(*patch)?;
+            Some((emission.light, emission.share, row))
+        });
+        for (light, share, row) in luminaires.chain(lamps) {
+            let share: f32 = share.to_array().iter().sum();
+            let values = irradiance.iter_mut().skip(light as usize);
+            for (value, factor) in values.step_by(lights).zip(row) {
+                *value += share * factor;
+            }
+        }
+        irradiance
+    }
 }
 
 /// The memory that a refinement borrows.
@@ -225,7 +314,11 @@ struct Memory {
     unshot: Vec<[[f32; LANES]; 3]>,
     patches: Vec<PatchState>,
     blocks: Vec<Block<LANES>>,
-    rows: Vec<f32>,
+    factors: Vec<f32>,
+    shares: Vec<Rgb>,
+    sources: Vec<[[f32; LANES]; 3]>,
+    sent: Vec<[[f32; LANES]; 3]>,
+    work: Vec<[[f32; LANES]; 3]>,
 }
 
 impl Memory {
@@ -246,15 +339,20 @@ impl Memory {
         let rows = if settings.plain {
             0
         } else {
-            p.min(ROW_BYTES / 4 / n.max(1))
+            p.min(ROW_BYTES / (4 * n + 12 * p).max(1))
         };
+        let known = if rows > 0 { p } else { 0 };
         Ok(Self {
             irradiance: vec![zero; n * blocks],
             direct: vec![zero; if settings.split_direct { n * blocks } else { 0 }],
             unshot: vec![zero; p * blocks],
             patches: vec![PatchState::EMPTY; p],
             blocks: vec![Block::EMPTY; blocks],
-            rows: vec![0.0; rows * n],
+            factors: vec![0.0; rows * n],
+            shares: vec![Rgb::BLACK; rows * p],
+            sources: vec![zero; known * blocks],
+            sent: vec![zero; known * blocks],
+            work: vec![zero; 6 * known],
         })
     }
 
@@ -265,20 +363,25 @@ impl Memory {
             unshot: &mut self.unshot,
             patches: &mut self.patches,
             blocks: &mut self.blocks,
-            rows: &mut self.rows,
+            rows: RowStorage {
+                factors: &mut self.factors,
+                shares: &mut self.shares,
+                sources: &mut self.sources,
+                sent: &mut self.sent,
+                work: &mut self.work,
+            },
         }
     }
 }
 
 /// Reads the contributions out of the refinement; what is still unshot enters as ambient light.
-fn solution(
-    scene: &OwnedScene,
-    settings: &Settings,
-    spacing: Spacing,
+fn read_out(
     mesh: &OwnedMesh,
+    lights: usize,
+    settings: &Settings,
     refinement: &Refinement<LANES>,
-) -> Solution {
-    let lights = scene.lights.len() as u32;
+) -> Solved {
+    let lights = lights as u32;
     let ambient: Vec<Rgb> = (0..lights)
         .map(|light| {
             if settings.plain {
@@ -295,26 +398,35 @@ fn solution(
             .map(|(element, light)| value(element, light))
             .collect()
     };
-    Solution {
-        surfaces: scene.surfaces.iter().map(|s| *s.polygon()).collect(),
-        mesh: mesh.clone(),
-        lights: scene
-            .lights
-            .iter()
-            .zip(0..)
-            .map(|(light, tag)| SolutionLight {
-                name: light.name.clone(),
-                emission: light.emission,
-                residual: refinement.light_residual(tag),
-            })
-            .collect(),
+    Solved {
         contributions: collect(&|element, light| {
             refinement.irradiance(element, light) + ambient[light as usize]
         }),
         direct: settings
             .split_direct
             .then(|| collect(&|element, light| refinement.direct(element, light))),
+        residuals: (0..lights).map(|l| refinement.light_residual(l)).collect(),
         rows: refinement.rows_evaluated(),
+        mesh: mesh.clone(),
+    }
+}
+
+fn solution(scene: &OwnedScene, spacing: Spacing, patches: usize, solved: Solved) -> Solution {
+    let _ = patches;
+    let lights = scene.lights.iter().zip(solved.residuals);
+    Solution {
+        surfaces: scene.surfaces.iter().map(|s| *s.polygon()).collect(),
+        mesh: solved.mesh,
+        lights: lights
+            .map(|(light, residual)| SolutionLight {
+                name: light.name.clone(),
+                emission: light.emission,
+                residual,
+            })
+            .collect(),
+        contributions: solved.contributions,
+        direct: solved.direct,
+        rows: solved.rows,
         spacing,
     }
 }

@@ -4,6 +4,8 @@
 //! bits. Threads take receiving patches, one after the other: what can stand between it and the
 //! shooter is looked up in the tree once, for all of its elements.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 use relume::form_factor::{self, Shooter};
 use relume::geometry::Polygon;
@@ -46,14 +48,14 @@ impl RowFiller for Serial<'_> {
     }
 }
 
-/// All threads, with a tree of boxes.
+/// All threads, with a tree of boxes, for one mesh.
 #[derive(Debug)]
 pub struct Parallel<'a> {
     bvh: &'a Bvh,
     /// Element numbers, patch by patch.
     elements: Vec<u32>,
-    /// Patches that have elements, with their ranges in the list above.
-    patches: Vec<(Polygon, std::ops::Range<usize>)>,
+    /// Patches that have elements, with their ranges of the list above.
+    patches: Vec<(Polygon, Range<usize>)>,
 }
 
 impl<'a> Parallel<'a> {
@@ -106,9 +108,9 @@ impl RowFiller for Parallel<'_> {
                 let margin = ROUNDINGS * largest_coordinate(&[polygon, *receiver]);
                 let shaft = Shaft::with_margin(*receiver, polygon, margin);
                 let narrowed = self.bvh.narrowed(&shaft);
-                let elements = self.elements[range.clone()].iter();
-                let elements = elements.filter_map(|e| mesh.elements.get(*e as usize));
-                elements
+                let receivers = self.elements[range.clone()].iter();
+                let receivers = receivers.filter_map(|e| mesh.elements.get(*e as usize));
+                receivers
                     .filter_map(|element| mesh.element_polygon(element))
                     .map(|receiver| shooter.form_factor(&receiver, &narrowed))
                     .collect()

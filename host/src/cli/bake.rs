@@ -78,6 +78,7 @@ impl Arguments {
                 MethodName::Host => Method::Host,
                 MethodName::Device => Method::Device,
             },
+            ..Settings::default()
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Meshing on the host: spacing from the scene's size, faces that light reaches, textures.
 
 mod reach;
+mod split;
 
 use relume::mesh::{
     Counts, Element, Face, Mesh, MeshError, MeshSink, Patch, Side, Spacing, element_count,
@@ -10,6 +11,8 @@ use relume::scene::Scene;
 
 use crate::bvh::Bvh;
 use crate::scene::OwnedScene;
+
+pub use split::{Direct, Split, split};
 
 /// Elements that the default spacing aims at.
 const DEFAULT_ELEMENTS: f32 = 8000.0;

@@ -79,17 +79,45 @@ impl Shooter {
         visibility.between(&Shaft::new(*receiver, self.polygon), &mut |blocker| {
             fits &= blockers.push(blocker).is_ok();
         });
-        let factors = gauss_points(receiver);
-        let factors = factors.iter().zip(&self.samples).map(|(point, samples)| {
-            let view = View {
-                point: point.position,
-                normal: receiver.normal(),
-                outline: above_horizon(point.position, receiver.normal(), self.polygon.vertices()),
-            };
-            let exact = fits.then(|| view.exact(&self.polygon, &blockers)).flatten();
-            point.weight * exact.unwrap_or_else(|| self.sampled(&view, samples, visibility))
+        let blockers = fits.then_some(blockers.as_slice());
+        let points = gauss_points(receiver);
+        let factors = points.iter().zip(&self.samples).map(|(point, samples)| {
+            point.weight
+                * self.seen_from(
+                    point.position,
+                    receiver.normal(),
+                    samples,
+                    blockers,
+                    visibility,
+                )
         });
-        factors.sum::<f32>().clamp(0.0, 1.0)
+        factors.sum::<f32>().min(1.0)
+    }
+
+    /// The form factor of a point with a unit normal to what it sees of the patch, in [0, 1].
+    ///
+    /// `blockers` are all that can stand between, or `None` for too many to cut out.
+    fn seen_from(
+        &self,
+        point: Vec3,
+        normal: Vec3,
+        samples: &[SamplePoint],
+        blockers: Option<&[&Polygon]>,
+        visibility: &impl Visibility,
+    ) -> f32 {
+        let (height, tolerance) = self.polygon.height(point);
+        if height <= tolerance {
+            return 0.0;
+        }
+        let view = View {
+            point,
+            normal,
+            outline: above_horizon(point, normal, self.polygon.vertices()),
+        };
+        let exact = blockers.and_then(|blockers| view.exact(&self.polygon, blockers));
+        exact
+            .unwrap_or_else(|| self.sampled(&view, samples, visibility))
+            .max(0.0)
     }
 
     /// Lambert's factor times the visible share of the kernel at some points of the patch.

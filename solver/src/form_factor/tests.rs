@@ -157,7 +157,8 @@ proptest! {
         let open = shooter.form_factor(&receiver, &Open);
         let surface = Surface::new(0, blocker.vertices(), Rgb::BLACK).unwrap();
         let blocked = shooter.form_factor(&receiver, &Occluders(&[surface]));
-        prop_assert!(blocked <= open * 1.000_001, "{blocked} {open}");
+        // Cut pieces round by themselves.
+            prop_assert!(blocked <= open * 1.000_01 + 1e-6, "{blocked} {open}");
     }
 
     #[test]

@@ -50,11 +50,25 @@ pub(super) fn add_to_lane<const K: usize>(lanes: &mut Lanes<K>, lane: usize, val
     }
 }
 
-pub(super) fn weighted<const K: usize>([r, g, b]: &Lanes<K>, weights: &[f32; K]) -> f32 {
+/// `lanes += factor * delta`, channel by channel.
+pub(super) fn add_scaled<const K: usize>(lanes: &mut Lanes<K>, delta: &Lanes<K>, factor: Rgb) {
+    for ((channel, delta), factor) in lanes.iter_mut().zip(delta).zip(factor.to_array()) {
+        for (value, delta) in channel.iter_mut().zip(delta) {
+            *value += factor * delta;
+        }
+    }
+}
+
+/// Sum over lanes of a weight times a function of the channels' sum.
+pub(super) fn weighted<const K: usize>(
+    [r, g, b]: &Lanes<K>,
+    weights: &[f32; K],
+    function: impl Fn(f32) -> f32,
+) -> f32 {
     let channels = r.iter().zip(g).zip(b);
     channels
         .zip(weights)
-        .map(|(((r, g), b), weight)| (r + g + b) * weight)
+        .map(|(((r, g), b), weight)| weight * function(r + g + b))
         .sum()
 }
 

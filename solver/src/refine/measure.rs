@@ -105,10 +105,4 @@ impl<const K: usize> Refinement<'_, K> {
     pub const fn rows_evaluated(&self) -> u32 {
         self.rows_evaluated
     }
-
-    /// Shots so far, those along known rows included.
-    #[must_use]
-    pub const fn shots(&self) -> u64 {
-        self.shots
-    }
 }

@@ -6,17 +6,23 @@
 //! `E_jm += F_ji dB_im` for every element `j` and light `m`,
 //! `dB_pm += sum_{j in p} A_j rho_j F_ji dB_im / A_p` for every patch `p`, `dB_im = 0`.
 //!
-//! The patch with the largest `sum_m w_m dB_im A_i` (summed over the channels) is next; `w_m` is
-//! the importance of the light. Residual of a light: `sum_i dB_im A_i` over the power that it
-//! emitted (area lights) or brought into the scene (luminaires); of the solution: the largest.
+//! A row that the storage keeps is never asked for again: what its patch has to send later is found by solving the
+//! system of all known patches, and reaches the elements in one pass ([`Refinement::finish`]).
+//! Rows for which there is no room are shot at once and asked for again.
+//!
+//! Next is the patch with the largest `sum_m w_m (dB_im A_i / P_m)^2` (summed over the channels), so that a dim light
+//! converges as well as a bright one, or, as published, the largest `sum_m w_m dB_im A_i`; `w_m`
+//! is the importance of the light and `P_m` the power that it emitted (area lights) or brought into the scene
+//! (luminaires). Residual of a light: `sum_i dB_im A_i / P_m`; of the solution: the largest.
 //! Ambient term (Cohen et al. 1988, eq. 12), per light, as an irradiance:
 //! `a = g U / (1 - g rho)`, with the unshot power `U` over the whole area, the mean reflectance
 //! `rho`, and `g`, the share of what the rows so far sent out that landed on elements (1 if all did).
 //!
-//! Lights come in blocks of `K` lanes; all blocks share one row. Rows that the caller hands in are
-//! kept as long as the row storage has room and are shot again without being evaluated again.
+//! Lights come in blocks of `K` lanes; all blocks share one row.
 
 mod error;
+mod known;
+mod krylov;
 mod lanes;
 mod measure;
 mod storage;
@@ -26,20 +32,32 @@ use crate::mesh::Mesh;
 
 pub use error::RefineError;
 pub use lanes::Lanes;
-pub use storage::{Block, FixedStorage, PatchState, Storage};
+pub use storage::{Block, FixedStorage, PatchState, RowStorage, Storage};
 
-use lanes::{add_to_lane, address, distribute, part, sum, weighted};
+use lanes::{add_scaled, add_to_lane, address, distribute, part, sum, weighted};
 
-/// A refinement under way. Its state is usable after every shot.
+/// Which patch is next.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Choice {
+    /// The largest sum over lights of the squared share of a light's power that is unshot.
+    #[default]
+    Relative,
+    /// The largest sum over lights of unshot power, as published.
+    Power,
+}
+
+/// A refinement under way. Its state is usable after every shot, by [`Self::finish`].
 #[derive(Debug)]
 pub struct Refinement<'a, const K: usize> {
     mesh: Mesh<'a>,
     lights: u32,
     residual: f32,
+    choice: Choice,
     storage: Storage<'a, K>,
+    /// Rows that fit into the storage.
+    capacity: usize,
     rows_kept: u32,
     rows_evaluated: u32,
-    shots: u64,
     /// Area shot so far, once per row, and how much of it landed on elements.
     area_shot: f64,
     area_landed: f64,
@@ -64,7 +82,7 @@ impl<'a, const K: usize> Refinement<'a, K> {
         if residual.is_nan() || residual <= 0.0 {
             return Err(RefineError::Residual);
         }
-        storage.fit(&mesh, lights)?;
+        let capacity = storage.fit(&mesh, lights)?;
         let mut emissions = mesh.faces.iter().filter_map(|face| face.emission);
         if emissions.any(|emission| emission.light >= lights) {
             return Err(RefineError::Unknown);
@@ -79,15 +97,22 @@ impl<'a, const K: usize> Refinement<'a, K> {
             mesh,
             lights,
             residual,
+            choice: Choice::Relative,
             storage,
+            capacity,
             rows_kept: 0,
             rows_evaluated: 0,
-            shots: 0,
             area_shot: 0.0,
             area_landed: 0.0,
         };
         refinement.emit();
+        refinement.start_sources();
         Ok(refinement)
+    }
+
+    /// Sets how the next shooter is chosen.
+    pub const fn set_choice(&mut self, choice: Choice) {
+        self.choice = choice;
     }
 
     /// Fills emitting patches with the exitance of their light.
@@ -150,7 +175,7 @@ impl<'a, const K: usize> Refinement<'a, K> {
         let n = self.mesh.elements.len();
         distribute(part(self.storage.irradiance, block, n), row, &delta);
         distribute(part(self.storage.direct, block, n), row, &delta);
-        self.reflect(block, &delta);
+        self.reflect(block, &delta, Source::Outside);
 
         let arrived: f32 = row
             .iter()
@@ -162,34 +187,23 @@ impl<'a, const K: usize> Refinement<'a, K> {
     }
 
     /// The patch to shoot next whose row is not known; `None` once the residual is reached.
-    ///
-    /// Patches whose row is known are shot on the way.
     pub fn next_shooter(&mut self) -> Option<u32> {
-        loop {
-            let patch = self.brightest(|_| true)?;
-            if self.residual() <= self.residual {
-                return None;
-            }
-            if !self.shoot_known(patch) {
-                return Some(patch);
-            }
+        let is_known = |state: &PatchState| state.row != 0;
+        let is_unknown = |state: &PatchState| state.row == 0;
+        let nearly_done = self.residual_of(is_unknown) <= self.residual;
+        if self.merit(is_known) > self.merit(is_unknown) || nearly_done {
+            self.settle();
         }
+        // What known patches hold is solved for in the end.
+        if self.residual_of(is_unknown) <= self.residual {
+            return None;
+        }
+        self.best(is_unknown)
     }
 
-    /// Shoots known rows until what they still hold is below the residual, or nothing is left.
+    /// Shoots all unshot radiosity of a patch along `row`, or keeps the row if there is room.
     ///
-    /// After an early stop this gives the best state that the rows seen so far allow.
-    pub fn finish(&mut self) {
-        let known = |state: &PatchState| state.row != 0;
-        while self.residual_of(known) > self.residual {
-            match self.brightest(known) {
-                Some(patch) if self.shoot_known(patch) => {}
-                _ => return,
-            }
-        }
-    }
-
-    /// Shoots all unshot radiosity of a patch along `row`, and keeps the row if there is room.
+    /// What goes along kept rows reaches the elements by [`Self::finish`].
     ///
     /// # Errors
     /// [`RefineError::Unknown`] for a patch that does not exist, [`RefineError::Row`] for a row
@@ -201,48 +215,45 @@ impl<'a, const K: usize> Refinement<'a, K> {
         self.check(row, 1.0)?;
         self.rows_evaluated += 1;
         self.note_landing(patch, row);
-        self.keep(patch, row);
-        self.distribute_all(patch, row);
-        Ok(())
-    }
-
-    /// Shoots a patch from the storage; false when its row is not there.
-    fn shoot_known(&mut self, patch: u32) -> bool {
-        let n = self.mesh.elements.len();
-        let state = self.storage.patches.get(patch as usize);
-        let Some(slot) = state.and_then(|s| (s.row as usize).checked_sub(1)) else {
-            return false;
-        };
-        // The row is borrowed apart from the rest of the state and put back afterwards.
-        let rows = core::mem::take(&mut self.storage.rows);
-        let row = rows.get(slot * n..).and_then(|tail| tail.get(..n));
-        let is_known = row.is_some();
-        if let Some(row) = row {
-            self.distribute_all(patch, row);
-        }
-        self.storage.rows = rows;
-        is_known
-    }
-
-    fn distribute_all(&mut self, patch: u32, row: &[f32]) {
         self.gather(row);
-        self.shots += 1;
-        let (n, count) = (self.mesh.elements.len(), self.mesh.patches.len());
-        let first_shot = self.take_first_shot(patch);
+        if let Some((block, delta)) = self.take_first_shot(patch) {
+            let n = self.mesh.elements.len();
+            distribute(part(self.storage.direct, block, n), row, &delta);
+        }
+        let is_kept = self.keep(patch, row);
         for block in 0..self.storage.blocks.len() {
-            let unshot = self.storage.unshot.get_mut(block * count + patch as usize);
-            let Some(delta) = unshot.map(|lanes| core::mem::replace(lanes, [[0.0; K]; 3])) else {
-                continue;
-            };
+            let delta = self.take_unshot(patch, block, is_kept);
             if delta.as_flattened().iter().all(|value| *value == 0.0) {
                 continue;
             }
-            distribute(part(self.storage.irradiance, block, n), row, &delta);
-            self.reflect(block, &delta);
+            if is_kept {
+                self.reflect(block, &delta, Source::Known);
+            } else {
+                let n = self.mesh.elements.len();
+                distribute(part(self.storage.irradiance, block, n), row, &delta);
+                self.reflect(block, &delta, Source::Outside);
+            }
         }
-        if let Some((block, delta)) = first_shot {
-            distribute(part(self.storage.direct, block, n), row, &delta);
+        Ok(())
+    }
+
+    /// What a patch has to shoot; it is noted as sent for a known patch, else as taken from its source.
+    fn take_unshot(&mut self, patch: u32, block: usize, is_kept: bool) -> Lanes<K> {
+        let index = block * self.mesh.patches.len() + patch as usize;
+        let unshot = self.storage.unshot.get_mut(index);
+        let delta = unshot.map_or([[0.0; K]; 3], |lanes| {
+            core::mem::replace(lanes, [[0.0; K]; 3])
+        });
+        let rows = &mut self.storage.rows;
+        let (books, sign) = if is_kept {
+            (rows.sent.get_mut(index), 1.0)
+        } else {
+            (rows.sources.get_mut(index), -1.0)
+        };
+        if let Some(lanes) = books {
+            add_scaled(lanes, &delta, Rgb::splat(sign));
         }
+        delta
     }
 
     /// The emission of a patch that has not been shot yet, with its block.
@@ -274,35 +285,19 @@ impl<'a, const K: usize> Refinement<'a, K> {
         }
     }
 
-    /// Adds what the gathered shares of `delta` reflect to the unshot radiosity of a block.
-    fn reflect(&mut self, block: usize, delta: &Lanes<K>) {
-        let unshot = part(self.storage.unshot, block, self.mesh.patches.len());
+    /// Adds what the gathered shares of `delta` reflect to the unshot radiosity of a block, and to
+    /// the sources of the known patches if it comes from outside their system.
+    fn reflect(&mut self, block: usize, delta: &Lanes<K>, source: Source) {
+        let count = self.mesh.patches.len();
+        let unshot = part(self.storage.unshot, block, count);
         for (lanes, state) in unshot.iter_mut().zip(self.storage.patches.iter()) {
-            let shares = state.gathered.to_array();
-            for ((channel, share), shot) in lanes.iter_mut().zip(shares).zip(delta) {
-                for (value, shot) in channel.iter_mut().zip(shot) {
-                    *value += share * shot;
-                }
-            }
+            add_scaled(lanes, delta, state.gathered);
         }
-    }
-
-    fn keep(&mut self, patch: u32, row: &[f32]) {
-        let n = self.mesh.elements.len();
-        let start = self.rows_kept as usize * n;
-        let room = self.storage.rows.get_mut(start..);
-        let (Some(room), Some(row)) = (room.and_then(|r| r.get_mut(..n)), row.get(..n)) else {
-            return;
-        };
-        let Some(state) = self.storage.patches.get_mut(patch as usize) else {
-            return;
-        };
-        if state.row == 0 && n > 0 {
-            for (kept, factor) in room.iter_mut().zip(row) {
-                *kept = *factor;
+        if source == Source::Outside {
+            let sources = part(self.storage.rows.sources, block, count);
+            for (lanes, state) in sources.iter_mut().zip(self.storage.patches.iter()) {
+                add_scaled(lanes, delta, state.gathered);
             }
-            self.rows_kept += 1;
-            state.row = self.rows_kept;
         }
     }
 
@@ -330,28 +325,57 @@ impl<'a, const K: usize> Refinement<'a, K> {
         }
     }
 
-    /// The patch with the largest weighted unshot power among those that `admit` lets pass;
-    /// `None` when none has any.
-    fn brightest(&self, admit: impl Fn(&PatchState) -> bool) -> Option<u32> {
+    /// How much a patch has to shoot, by the rule of the choice.
+    fn patch_merit(&self, patch: u32, area: f32) -> f32 {
         let count = self.mesh.patches.len();
+        let blocks = self.storage.blocks.iter().zip(0..);
+        blocks
+            .filter_map(|(block, index)| {
+                let lanes = self.storage.unshot.get(index * count + patch as usize)?;
+                Some(match self.choice {
+                    Choice::Power => weighted(lanes, &block.importance, |power| power * area),
+                    Choice::Relative => {
+                        let shares = block.importance_by_power();
+                        weighted(lanes, &shares, |power| power * area * power * area)
+                    }
+                })
+            })
+            .sum()
+    }
+
+    /// The sum of merits of all patches that `admit` lets pass.
+    fn merit(&self, admit: impl Fn(&PatchState) -> bool) -> f32 {
+        let patches = self.mesh.patches.iter().zip(self.storage.patches.iter());
+        patches
+            .zip(0..)
+            .filter(|((_, state), _)| admit(state))
+            .map(|((patch, _), id)| self.patch_merit(id, patch.area))
+            .sum()
+    }
+
+    /// The patch with the largest merit among those that `admit` lets pass; `None` when none has any.
+    fn best(&self, admit: impl Fn(&PatchState) -> bool) -> Option<u32> {
         let mut best = (0.0, None);
         let patches = self.mesh.patches.iter().zip(self.storage.patches.iter());
         for ((patch, state), id) in patches.zip(0..) {
-            if !admit(state) {
-                continue;
-            }
-            let mut power = 0.0;
-            for (block, index) in self.storage.blocks.iter().zip(0..) {
-                if let Some(lanes) = self.storage.unshot.get(index * count + id as usize) {
-                    power += weighted(lanes, &block.importance);
+            if admit(state) {
+                let merit = self.patch_merit(id, patch.area);
+                if merit > best.0 {
+                    best = (merit, Some(id));
                 }
-            }
-            if power * patch.area > best.0 {
-                best = (power * patch.area, Some(id));
             }
         }
         best.1
     }
+}
+
+/// Where reflected light comes from.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Source {
+    /// A patch whose row is kept.
+    Known,
+    /// A luminaire, or a patch whose row is not kept.
+    Outside,
 }
 
 #[cfg(test)]

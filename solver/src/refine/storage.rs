@@ -39,6 +39,19 @@ impl<const K: usize> Block<K> {
         emitted: [0.0; K],
         importance: [1.0; K],
     };
+
+    /// Importance over the square of the emitted power; 0 for a light that emits nothing.
+    pub(super) fn importance_by_power(&self) -> [f32; K] {
+        let mut weights = self.importance;
+        for (weight, emitted) in weights.iter_mut().zip(self.emitted) {
+            *weight = if emitted > 0.0 {
+                *weight / emitted / emitted
+            } else {
+                0.0
+            };
+        }
+        weights
+    }
 }
 
 /// Memory for one refinement, lent by the caller; contents are overwritten.
@@ -56,8 +69,37 @@ pub struct Storage<'a, const K: usize> {
     pub patches: &'a mut [PatchState],
     /// `b`: lights divided by `K`, rounded up.
     pub blocks: &'a mut [Block<K>],
-    /// Kept rows, `n` floats each; as many as fit, possibly none.
-    pub rows: &'a mut [f32],
+    /// Kept rows; as many as fit, possibly none.
+    pub rows: RowStorage<'a, K>,
+}
+
+/// Memory for rows that are not to be evaluated twice, and for solving the system of their patches.
+///
+/// A row takes `4 n + 12 p` bytes. With none of it a refinement shoots again what it has seen
+/// before, as published.
+#[derive(Debug, Default)]
+pub struct RowStorage<'a, const K: usize> {
+    /// Form factors, `n` for each row.
+    pub factors: &'a mut [f32],
+    /// What share of a row each patch reflects, `p` for each row.
+    pub shares: &'a mut [Rgb],
+    /// Radiosity that known patches must send besides what they get from each other, at least `p * b`.
+    pub sources: &'a mut [Lanes<K>],
+    /// Radiosity that known patches sent, at least `p * b`.
+    pub sent: &'a mut [Lanes<K>],
+    /// Room for the solution, at least `6 p`.
+    pub work: &'a mut [Lanes<K>],
+}
+
+impl<const K: usize> RowStorage<'_, K> {
+    /// How many rows it can keep of a mesh with `n` elements and `p` patches for `b` blocks.
+    fn capacity(&self, n: usize, p: usize, b: usize) -> usize {
+        let lanes = self.sources.len().min(self.sent.len());
+        if n == 0 || p == 0 || lanes < p * b || self.work.len() < 6 * p {
+            return 0;
+        }
+        (self.factors.len() / n).min(self.shares.len() / p).min(p)
+    }
 }
 
 /// Storage of fixed capacity for one block of lights, fit for a `static`.
@@ -82,7 +124,11 @@ pub struct FixedStorage<
     unshot: [Lanes<K>; PATCHES],
     patches: [PatchState; PATCHES],
     block: [Block<K>; 1],
-    rows: [[f32; ELEMENTS]; ROWS],
+    factors: [[f32; ELEMENTS]; ROWS],
+    shares: [[Rgb; PATCHES]; ROWS],
+    sources: [Lanes<K>; PATCHES],
+    sent: [Lanes<K>; PATCHES],
+    work: [[Lanes<K>; PATCHES]; 6],
 }
 
 impl<const K: usize, const PATCHES: usize, const ELEMENTS: usize, const ROWS: usize>
@@ -102,7 +148,11 @@ impl<const K: usize, const PATCHES: usize, const ELEMENTS: usize, const ROWS: us
             unshot: [[[0.0; K]; 3]; PATCHES],
             patches: [PatchState::EMPTY; PATCHES],
             block: [Block::EMPTY],
-            rows: [[0.0; ELEMENTS]; ROWS],
+            factors: [[0.0; ELEMENTS]; ROWS],
+            shares: [[Rgb::BLACK; PATCHES]; ROWS],
+            sources: [[[0.0; K]; 3]; PATCHES],
+            sent: [[[0.0; K]; 3]; PATCHES],
+            work: [[[[0.0; K]; 3]; PATCHES]; 6],
         }
     }
 
@@ -115,7 +165,13 @@ impl<const K: usize, const PATCHES: usize, const ELEMENTS: usize, const ROWS: us
             unshot: &mut self.unshot,
             patches: &mut self.patches,
             blocks: &mut self.block,
-            rows: self.rows.as_flattened_mut(),
+            rows: RowStorage {
+                factors: self.factors.as_flattened_mut(),
+                shares: self.shares.as_flattened_mut(),
+                sources: &mut self.sources,
+                sent: &mut self.sent,
+                work: self.work.as_flattened_mut(),
+            },
         }
     }
 }
@@ -129,8 +185,9 @@ impl<const K: usize, const PATCHES: usize, const ELEMENTS: usize, const ROWS: us
 }
 
 impl<const K: usize> Storage<'_, K> {
-    /// Checks that every slice is long enough and cuts those to length that are walked whole.
-    pub(super) fn fit(&mut self, mesh: &Mesh, lights: u32) -> Result<(), RefineError> {
+    /// Checks that every slice is long enough, cuts those to length that are walked whole, and
+    /// tells how many rows can be kept.
+    pub(super) fn fit(&mut self, mesh: &Mesh, lights: u32) -> Result<usize, RefineError> {
         let blocks = (lights as usize).div_ceil(K.max(1));
         if self.blocks.len() < blocks {
             return Err(RefineError::TooManyLights {
@@ -156,7 +213,7 @@ impl<const K: usize> Storage<'_, K> {
         }
         cut(&mut self.blocks, blocks);
         cut(&mut self.patches, p);
-        Ok(())
+        Ok(self.rows.capacity(n, p, blocks))
     }
 }
 
