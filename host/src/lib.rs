@@ -20,8 +20,11 @@ pub mod mesh;
 
 pub mod solution;
 
-pub mod bake;
 pub mod rows;
+
+pub mod gather;
+
+pub mod bake;
 
 pub mod picture;
 

@@ -1,5 +1,6 @@
 //! Meshing on the host: spacing from the scene's size, faces that light reaches, textures.
 
+mod locate;
 mod reach;
 mod split;
 
@@ -12,6 +13,7 @@ use relume::scene::Scene;
 use crate::bvh::Bvh;
 use crate::scene::OwnedScene;
 
+pub use locate::Locator;
 pub use split::{Direct, Split, split};
 
 /// Elements that the default spacing aims at.

@@ -17,17 +17,21 @@ const RUNS: usize = 4;
 
 /// Memory of a solve, as many lanes in each as the system has unknowns.
 #[derive(Debug)]
-pub(super) struct Work<'a, const K: usize> {
+pub struct Work<'a, const K: usize> {
+    /// The residual that a run starts with.
     pub shadow: &'a mut [Lanes<K>],
+    /// The direction of a step.
     pub direction: &'a mut [Lanes<K>],
+    /// What the system makes of it.
     pub along: &'a mut [Lanes<K>],
+    /// What the system makes of the residual after it.
     pub across: &'a mut [Lanes<K>],
 }
 
 /// Adds to `x` until the residual `r = b - A x` of every lane is `tolerance` of what it was.
 ///
 /// `apply(v, y)` sets `y = A v`. `r` is `b - A x` on entry and stays it.
-pub(super) fn solve<const K: usize>(
+pub fn solve<const K: usize>(
     mut apply: impl FnMut(&[Lanes<K>], &mut [Lanes<K>]),
     x: &mut [Lanes<K>],
     r: &mut [Lanes<K>],
@@ -48,11 +52,11 @@ pub(super) fn solve<const K: usize>(
         if is_dark(&under_way) {
             return;
         }
-        shadow.copy_from_slice(r);
+        copy(shadow, r);
         apply(shadow, along);
         step(x, shadow, &under_way);
         step(r, along, &negative(under_way));
-        shadow.copy_from_slice(r);
+        copy(shadow, r);
         direction.fill([[0.0; K]; 3]);
         along.fill([[0.0; K]; 3]);
         let (mut rho, mut alpha, mut omega) = ([[1.0; K]; 3], [[1.0; K]; 3], [[1.0; K]; 3]);
@@ -81,6 +85,12 @@ pub(super) fn solve<const K: usize>(
             let moves = each(alpha, omega, |a, b| yes(a != 0.0 && b != 0.0));
             under_way = each(under_way, moves, |a, b| a * b);
         }
+    }
+}
+
+fn copy<const K: usize>(to: &mut [Lanes<K>], from: &[Lanes<K>]) {
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = *from;
     }
 }
 

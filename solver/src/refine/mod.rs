@@ -22,7 +22,7 @@
 
 mod error;
 mod known;
-mod krylov;
+pub mod krylov;
 mod lanes;
 mod measure;
 mod storage;
