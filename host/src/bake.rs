@@ -16,7 +16,7 @@ use relume::visibility::{Occluders, Visibility};
 use thiserror::Error;
 
 use crate::bvh::Bvh;
-use crate::mesh::{self, OwnedMesh};
+use crate::mesh::{self, BuildError, OwnedMesh};
 use crate::scene::OwnedScene;
 use crate::solution::{Solution, SolutionLight};
 
@@ -86,13 +86,23 @@ impl Default for Settings {
 
 /// How far a bake has come.
 #[derive(Clone, Copy, Debug)]
-pub struct Progress {
-    /// Rows evaluated so far.
-    pub rows: u32,
-    /// Patches of the mesh.
-    pub patches: usize,
-    /// Largest residual over the lights.
-    pub residual: f32,
+pub enum Progress {
+    /// Looking for the faces that light reaches, and lighting them by luminaires.
+    Meshing {
+        /// Parts of the scene that were looked at.
+        done: usize,
+        /// All of them.
+        parts: usize,
+    },
+    /// Evaluating rows: what is known so far makes a solution.
+    Shooting {
+        /// Rows evaluated so far.
+        rows: u32,
+        /// Patches of the mesh.
+        patches: usize,
+        /// Largest residual over the lights.
+        residual: f32,
+    },
 }
 
 /// Why a bake cannot be done.
@@ -104,7 +114,19 @@ pub enum BakeError {
     Scene(#[from] SceneError),
     /// The scene cannot be divided so.
     #[error("{0}; ask for longer patches and elements (--patch, --element)")]
-    Mesh(#[from] MeshError),
+    Mesh(MeshError),
+    /// No surface reflects, so that nothing can be lit.
+    #[error("no surface reflects light: give a material a reflectance (Kd, base colour) above 0")]
+    NothingReflects,
+    /// No element receives light.
+    #[error(
+        "light reaches no surface: turn lamps so that their front (vertices counter-clockwise) faces \
+         the scene, and hang other lights in front of surfaces, not on them"
+    )]
+    NothingLit,
+    /// The watcher broke before there was anything to return.
+    #[error("interrupted before the first row")]
+    Interrupted,
     /// The refinement refuses the input.
     #[error(transparent)]
     Refine(#[from] RefineError),
@@ -126,8 +148,18 @@ pub enum BakeError {
     },
 }
 
+impl From<BuildError> for BakeError {
+    fn from(error: BuildError) -> Self {
+        match error {
+            BuildError::Mesh(error) => Self::Mesh(error),
+            BuildError::Interrupted => Self::Interrupted,
+        }
+    }
+}
+
 /// Bakes a scene. `watch` is called before every row; when it breaks, what is known so far is
-/// finished and returned, as `shots` would.
+/// finished and returned, as `shots` would. It is called while the mesh is made as well, where
+/// there is nothing to return yet: [`BakeError::Interrupted`].
 ///
 /// # Errors
 /// [`BakeError`] when the scene is not fit to be baked.
@@ -139,10 +171,20 @@ pub fn bake(
     if scene.lights.is_empty() {
         return Err(BakeError::NoLight);
     }
-    let view = scene.view()?;
+    let centred = mesh::centred(scene);
+    let lights = u32::try_from(scene.lights.len()).unwrap_or(u32::MAX);
+    let view = Scene::new(&centred.surfaces, &centred.luminaires, lights)?;
+    if view.surfaces().iter().all(|s| s.reflectance().is_black()) {
+        return Err(BakeError::NothingReflects);
+    }
     let spacing = mesh::spacing(&view, settings.patch, settings.element);
     let bvh = Bvh::for_scene(&view);
-    let mesh = mesh::build(scene, &view, spacing, &bvh)?;
+    let mesh = mesh::build(scene, &view, spacing, &bvh, &mut |done, parts| {
+        watch(Progress::Meshing { done, parts })
+    })?;
+    if mesh.elements.is_empty() {
+        return Err(BakeError::NothingLit);
+    }
     let mut memory = Memory::new(&mesh, scene.lights.len(), settings)?;
     let mut refinement = Refinement::<LANES>::new(
         mesh.view(),
@@ -163,7 +205,7 @@ pub fn bake(
             watch,
         )?,
         Method::Device => {
-            let serial = Serial(Occluders(&scene.surfaces));
+            let serial = Serial(Occluders(view.surfaces()));
             refine(
                 &mut refinement,
                 &view,
@@ -235,12 +277,25 @@ fn refine(
 ) -> Result<(), BakeError> {
     let mut row = vec![0.0; mesh.elements.len()];
     let far = luminaire::far(scene);
-    for luminaire in scene.luminaires() {
+    let luminaires = scene.luminaires();
+    for (luminaire, done) in luminaires.iter().zip(0..) {
+        let progress = Progress::Meshing {
+            done,
+            parts: luminaires.len(),
+        };
+        if watch(progress).is_break() {
+            return Err(BakeError::Interrupted);
+        }
         filler.luminaire(&mesh, luminaire, far, &mut row);
         refinement.illuminate(luminaire.light(), luminaire.share(), &row)?;
     }
     // Asking for the next shooter shoots known rows, so both ways to stop come after it: a bake
     // that is interrupted gives the bits of one that was told to stop there.
+    let shooting = |refinement: &Refinement<LANES>| Progress::Shooting {
+        rows: refinement.rows_evaluated(),
+        patches: mesh.patches.len(),
+        residual: refinement.residual(),
+    };
     while let Some(patch) = refinement.next_shooter() {
         if settings
             .shots
@@ -248,23 +303,14 @@ fn refine(
         {
             break;
         }
-        let progress = Progress {
-            rows: refinement.rows_evaluated(),
-            patches: mesh.patches.len(),
-            residual: refinement.residual(),
-        };
-        if watch(progress).is_break() {
+        if watch(shooting(refinement)).is_break() {
             break;
         }
         filler.patch(&mesh, patch, &mut row);
         refinement.shoot(patch, &row)?;
     }
     // A wish to stop that came while known rows were shot is heard here.
-    let _ = watch(Progress {
-        rows: refinement.rows_evaluated(),
-        patches: mesh.patches.len(),
-        residual: refinement.residual(),
-    });
+    let _ = watch(shooting(refinement));
     refinement.finish();
     Ok(())
 }
@@ -330,16 +376,21 @@ fn solution(
     refinement: &Refinement<LANES>,
 ) -> Solution {
     let lights = scene.lights.len() as u32;
+    let elements = mesh.elements.len() as u32;
+    // What is left of a light that has shot its share and met nothing will meet nothing either.
+    let is_lost = |light: u32| {
+        let meets = |element| refinement.irradiance(element, light) != Rgb::BLACK;
+        refinement.light_residual(light) <= settings.residual && !(0..elements).any(meets)
+    };
     let ambient: Vec<Rgb> = (0..lights)
         .map(|light| {
-            if settings.plain {
+            if settings.plain || is_lost(light) {
                 Rgb::BLACK
             } else {
                 refinement.ambient(light)
             }
         })
         .collect();
-    let elements = mesh.elements.len() as u32;
     let collect = |value: &dyn Fn(u32, u32) -> Rgb| -> Vec<Rgb> {
         (0..elements)
             .flat_map(|element| (0..lights).map(move |light| (element, light)))
@@ -348,7 +399,7 @@ fn solution(
     };
     Solution {
         surfaces: scene.surfaces.iter().map(|s| *s.polygon()).collect(),
-        mesh: mesh.clone(),
+        mesh: mesh::returned(mesh, scene),
         lights: scene
             .lights
             .iter()
@@ -367,5 +418,122 @@ fn solution(
             .then(|| collect(&|element, light| refinement.direct(element, light))),
         rows: refinement.rows_evaluated(),
         spacing,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Light;
+    use glam::Vec3;
+    use relume::scene::{Emission, Source, Surface};
+
+    /// A room from -2 to 2 with a closed box on its floor, a lamp and a point light; `at` is its
+    /// middle, and every coordinate a multiple of 1/64.
+    fn room(at: Vec3) -> OwnedScene {
+        let closed = |middle: Vec3, half: f32| {
+            [Vec3::X, Vec3::Y, Vec3::Z]
+                .into_iter()
+                .flat_map(|axis| [axis, -axis])
+                .map(move |out| {
+                    let (u, v) = out.any_orthonormal_pair();
+                    let corners = [out - u - v, out - u + v, out + u + v, out + u - v];
+                    corners.map(|corner| at + middle + corner * half)
+                })
+        };
+        let walls = closed(Vec3::ZERO, 2.0).chain(closed(Vec3::new(0.5, -1.5, 0.25), 0.5));
+        let mut surfaces: Vec<Surface> = walls
+            .zip(0..)
+            .map(|(wall, index)| Surface::new(index, &wall, Rgb::splat(0.5)).unwrap())
+            .map(Surface::two_sided)
+            .collect();
+        let lamp = [(-1.0, -1.0), (-0.5, -1.0), (-0.5, -0.5), (-1.0, -0.5)];
+        let lamp = lamp.map(|(x, z)| at + Vec3::new(x, 1.875, z));
+        let emission = Emission {
+            light: 0,
+            share: Rgb::WHITE,
+        };
+        let lamp = Surface::new(12, &lamp, Rgb::BLACK).unwrap();
+        surfaces.push(lamp.emitting(12, emission).unwrap());
+        let position = at + Vec3::new(0.5, 0.75, 0.5);
+        let light = |name: &str| Light {
+            name: name.to_owned(),
+            emission: Rgb::WHITE,
+            importance: 1.0,
+        };
+        OwnedScene {
+            textures: vec![None; surfaces.len()],
+            surfaces,
+            luminaires: vec![Luminaire::new(1, Rgb::WHITE, Source::Point { position }).unwrap()],
+            lights: vec![light("lamp"), light("bulb")],
+        }
+    }
+
+    const COARSE: Settings = Settings {
+        patch: Some(1.0),
+        element: Some(0.5),
+        residual: 1e-4,
+        shots: None,
+        plain: false,
+        split_direct: false,
+        method: Method::Host,
+    };
+
+    #[test]
+    fn a_scene_far_from_the_origin_has_the_faces_and_the_light_of_one_at_home() {
+        let bake =
+            |scene: &OwnedScene| bake(scene, &COARSE, &mut |_| ControlFlow::Continue(())).unwrap();
+        let home = bake(&room(Vec3::ZERO));
+        // One side of each wall; one of each of the box's, and none of that on the floor; the lamp.
+        assert_eq!(home.mesh.faces.len(), 6 + 5 + 1);
+        for far in [10.0, 100.0, 1e3, 1e4, 1e5] {
+            for at in [Vec3::splat(far), Vec3::new(0.0, -far, 0.0)] {
+                let scene = room(at);
+                let away = bake(&scene);
+                assert!(away.contributions == home.contributions, "{at}");
+                assert_eq!(away.mesh.elements, home.mesh.elements, "{at}");
+                for face in &away.mesh.faces {
+                    let own = *scene.surfaces[face.surface as usize].polygon();
+                    let outlines = [own, own.flipped()];
+                    assert!(outlines.contains(&face.polygon), "{at}: {face:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn who_breaks_off_gets_nothing_before_the_first_row_and_what_is_known_after_it() {
+        let scene = room(Vec3::ZERO);
+        let is_row = |progress: &Progress| matches!(progress, Progress::Shooting { .. });
+        // How often the watcher is asked before the first row.
+        let mut early = 0;
+        let whole = bake(&scene, &COARSE, &mut |progress| {
+            early += usize::from(!is_row(&progress));
+            ControlFlow::Continue(())
+        });
+        assert!(early >= 2, "parts of the scene, and a luminaire: {early}");
+        for patience in 0..early + 10 {
+            let mut asked = 0;
+            let part = bake(&scene, &COARSE, &mut |_| {
+                asked += 1;
+                if asked > patience {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
+            });
+            if patience < early {
+                assert!(matches!(part, Err(BakeError::Interrupted)), "{patience}");
+                assert_eq!(asked, patience + 1, "it went on");
+                continue;
+            }
+            let part = part.unwrap();
+            let told = Settings {
+                shots: Some(part.rows),
+                ..COARSE
+            };
+            let told = bake(&scene, &told, &mut |_| ControlFlow::Continue(()));
+            assert!(part == told.unwrap() && part != *whole.as_ref().unwrap());
+        }
     }
 }

@@ -8,10 +8,11 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
+use relume::color::Rgb;
 use serde_json::json;
 
 use super::{Outcome, human_bytes, output_path, tell, write_file};
-use crate::bake::{Method, Progress, Settings, bake};
+use crate::bake::{BakeError, Method, Progress, Settings, bake};
 use crate::import;
 use crate::scene::OwnedScene;
 use crate::solution::{self, Solution};
@@ -103,6 +104,16 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     let baked = pool
         .install(|| watched(&imported.scene, &arguments.settings()))
         .with_context(|| path.clone())?;
+    let Some(baked) = baked else {
+        return Ok(Outcome {
+            interrupted: true,
+            report: json!({"interrupted": true}),
+        });
+    };
+    let unlit = baked.unlit(arguments.residual);
+    if !unlit.is_empty() {
+        tell!("{path}: lights that reach no surface: {}", unlit.join(", "));
+    }
     let bytes = solution::write(&baked.solution);
     write_file(&output, &bytes)?;
     report(&baked, &output.display().to_string(), bytes.len());
@@ -129,6 +140,7 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
             "method": arguments.settings().method.name(),
             "seconds": baked.time.as_secs_f64(),
             "interrupted": baked.interrupted,
+            "unlit": unlit,
             "repairs": imported.repairs.lines(),
         }),
     })
@@ -147,13 +159,35 @@ impl Baked {
         let residuals = self.solution.lights.iter().map(|light| light.residual);
         residuals.fold(0.0, f32::max)
     }
+
+    /// Names of the lights that have shot their share and reached nothing.
+    fn unlit(&self, goal: f32) -> Vec<&str> {
+        let lights = self.solution.lights.iter().enumerate();
+        let values = &self.solution.contributions;
+        let mut lit = vec![false; lights.len()];
+        for element in values.chunks(lit.len()) {
+            for (lit, value) in lit.iter_mut().zip(element) {
+                *lit |= *value != Rgb::BLACK;
+            }
+        }
+        lights
+            .filter(|(tag, light)| !lit[*tag] && light.residual <= goal)
+            .map(|(_, light)| light.name.as_str())
+            .collect()
+    }
 }
 
 /// Set by the first Ctrl-C; the second one ends the program at once.
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// Bakes with a progress bar (on a terminal) and an ear for Ctrl-C.
-pub fn watched(scene: &OwnedScene, settings: &Settings) -> Result<Baked> {
+/// True when the user has asked to end, at any time since the first bake began.
+pub fn is_interrupted() -> bool {
+    INTERRUPTED.load(Ordering::Relaxed)
+}
+
+/// Bakes with a progress bar (on a terminal) and an ear for Ctrl-C; `None` when that came before
+/// there was a solution.
+pub fn watched(scene: &OwnedScene, settings: &Settings) -> Result<Option<Baked>> {
     // A handler that is already there does the same.
     let _ = ctrlc::set_handler(|| {
         if INTERRUPTED.swap(true, Ordering::Relaxed) {
@@ -161,16 +195,28 @@ pub fn watched(scene: &OwnedScene, settings: &Settings) -> Result<Baked> {
         }
     });
     let bar = ProgressBar::new(0).with_style(
-        ProgressStyle::with_template("{bar:30} {pos}/{len} rows  {msg}  {elapsed}")
+        ProgressStyle::with_template("{bar:30} {pos}/{len} {msg}  {elapsed}")
             .context("progress bar")?,
     );
     let start = Instant::now();
     let mut interrupted = false;
     let mut watch = |progress: Progress| {
-        bar.set_length(progress.patches as u64);
-        bar.set_position(progress.rows.into());
-        bar.set_message(format!("residual {:.5}", progress.residual));
-        interrupted = INTERRUPTED.load(Ordering::Relaxed);
+        let (done, all, what) = match progress {
+            Progress::Meshing { done, parts } => (done, parts, "parts meshed".to_owned()),
+            Progress::Shooting {
+                rows,
+                patches,
+                residual,
+            } => (
+                rows as usize,
+                patches,
+                format!("rows  residual {residual:.5}"),
+            ),
+        };
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+        bar.set_message(what);
+        interrupted = is_interrupted();
         if interrupted {
             ControlFlow::Break(())
         } else {
@@ -179,11 +225,15 @@ pub fn watched(scene: &OwnedScene, settings: &Settings) -> Result<Baked> {
     };
     let solution = bake(scene, settings, &mut watch);
     bar.finish_and_clear();
-    Ok(Baked {
+    if matches!(solution, Err(BakeError::Interrupted)) {
+        tell!("interrupted before the first row: there is nothing to write");
+        return Ok(None);
+    }
+    Ok(Some(Baked {
         solution: solution?,
         time: start.elapsed(),
         interrupted,
-    })
+    }))
 }
 
 fn report(baked: &Baked, file: &str, bytes: usize) {
