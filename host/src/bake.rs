@@ -87,9 +87,10 @@ impl Default for Settings {
 /// How far a bake has come.
 #[derive(Clone, Copy, Debug)]
 pub enum Progress {
-    /// Looking for the faces that light reaches, and lighting them by luminaires.
+    /// Looking for the faces that light reaches, then lighting them by luminaires: nothing to return
+    /// yet.
     Meshing {
-        /// Parts of the scene that were looked at.
+        /// Parts of the scene that were looked at, or luminaires that were lit.
         done: usize,
         /// All of them.
         parts: usize,
@@ -172,8 +173,7 @@ pub fn bake(
         return Err(BakeError::NoLight);
     }
     let centred = mesh::centred(scene);
-    let lights = u32::try_from(scene.lights.len()).unwrap_or(u32::MAX);
-    let view = Scene::new(&centred.surfaces, &centred.luminaires, lights)?;
+    let view = centred.view()?;
     if view.surfaces().iter().all(|s| s.reflectance().is_black()) {
         return Err(BakeError::NothingReflects);
     }

@@ -17,6 +17,9 @@ use crate::import;
 use crate::scene::OwnedScene;
 use crate::solution::{self, Solution};
 
+/// Most names in a line for people; `--json` has them all.
+const MOST_NAMES: usize = 8;
+
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// The scene: .obj, .gltf or .glb
@@ -112,7 +115,13 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     };
     let unlit = baked.unlit(arguments.residual);
     if !unlit.is_empty() {
-        tell!("{path}: lights that reach no surface: {}", unlit.join(", "));
+        let more = if unlit.len() > MOST_NAMES {
+            ", ..."
+        } else {
+            ""
+        };
+        let names = unlit[..unlit.len().min(MOST_NAMES)].join(", ");
+        tell!("{path}: lights that reach no surface: {names}{more}");
     }
     let bytes = solution::write(&baked.solution);
     write_file(&output, &bytes)?;
@@ -202,7 +211,7 @@ pub fn watched(scene: &OwnedScene, settings: &Settings) -> Result<Option<Baked>>
     let mut interrupted = false;
     let mut watch = |progress: Progress| {
         let (done, all, what) = match progress {
-            Progress::Meshing { done, parts } => (done, parts, "parts meshed".to_owned()),
+            Progress::Meshing { done, parts } => (done, parts, "before the first row".to_owned()),
             Progress::Shooting {
                 rows,
                 patches,

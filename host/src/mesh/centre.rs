@@ -11,7 +11,7 @@ use std::borrow::Cow;
 
 use glam::Vec3;
 use relume::mesh::Side;
-use relume::scene::{Luminaire, Source, Surface};
+use relume::scene::{Luminaire, Scene, SceneError, Source, Surface};
 
 use super::OwnedMesh;
 use crate::scene::OwnedScene;
@@ -19,10 +19,20 @@ use crate::scene::OwnedScene;
 /// The surfaces and luminaires of a scene, near the origin.
 #[derive(Clone, Debug)]
 pub struct Centred<'a> {
-    /// The surfaces, in the scene's order.
-    pub surfaces: Cow<'a, [Surface]>,
-    /// The luminaires, in the scene's order.
-    pub luminaires: Cow<'a, [Luminaire]>,
+    surfaces: Cow<'a, [Surface]>,
+    luminaires: Cow<'a, [Luminaire]>,
+    lights: usize,
+}
+
+impl Centred<'_> {
+    /// The solver's view of it.
+    ///
+    /// # Errors
+    /// [`SceneError`] when a tag is out of range.
+    pub fn view(&self) -> Result<Scene<'_>, SceneError> {
+        let lights = u32::try_from(self.lights).unwrap_or(u32::MAX);
+        Scene::new(&self.surfaces, &self.luminaires, lights)
+    }
 }
 
 /// Moves a scene to the origin, if it is far away from it; else all stays where it is.
@@ -31,6 +41,7 @@ pub fn centred(scene: &OwnedScene) -> Centred<'_> {
     moved(scene, middle(&scene.surfaces)).unwrap_or(Centred {
         surfaces: Cow::Borrowed(&scene.surfaces),
         luminaires: Cow::Borrowed(&scene.luminaires),
+        lights: scene.lights.len(),
     })
 }
 
@@ -73,6 +84,7 @@ fn moved<'a>(scene: &OwnedScene, by: Vec3) -> Option<Centred<'a>> {
         luminaires: luminaires
             .map(|luminaire| moved_luminaire(luminaire, by))
             .collect::<Option<_>>()?,
+        lights: scene.lights.len(),
     })
 }
 
