@@ -668,6 +668,154 @@ fn an_interrupted_bake_is_byte_for_byte_what_its_shots_give() {
     panic!("never interrupted in time");
 }
 
+/// Runs the program, sends it Ctrl-C as soon as `is_time`, and waits for its end.
+#[cfg(unix)]
+fn interrupted(
+    mut command: std::process::Command,
+    is_time: impl Fn() -> bool,
+) -> std::process::Output {
+    use std::process::{Command, Stdio};
+
+    let command = command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("relume starts");
+    while !is_time() && child.try_wait().expect("a child").is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    let mut kill = Command::new("kill");
+    let kill = kill.args(["-INT", &child.id().to_string()]);
+    kill.status().expect("there is a `kill`");
+    child.wait_with_output().expect("relume ends")
+}
+
+#[cfg(unix)]
+#[test]
+fn a_bake_that_is_interrupted_before_its_first_row_writes_nothing() {
+    use std::time::{Duration, Instant};
+
+    // The insides of 2000 closed boxes under a lamp: no light to be found in any of them.
+    const CORNERS: [&str; 6] = [
+        "-8 -7 -5 -6",
+        "-4 -3 -1 -2",
+        "-8 -7 -3 -4",
+        "-6 -5 -1 -2",
+        "-8 -6 -2 -4",
+        "-7 -5 -1 -3",
+    ];
+    let mut obj = "mtllib room.mtl\n".to_owned();
+    for number in 0..2000 {
+        for corner in 0..8 {
+            let (x, y) = (
+                number % 50 * 2 + corner % 2,
+                number / 50 * 2 + corner / 2 % 2,
+            );
+            obj += &format!("v {x} {y} {}\n", corner / 4);
+        }
+        obj += "usemtl white\n";
+        obj.extend(CORNERS.map(|face| format!("f {face}\n")));
+    }
+    obj += "v 0 0 9\nv 0 9 9\nv 9 9 9\nv 9 0 9\nusemtl ceiling\nf -4 -3 -2 -1\n";
+    let folder = with_scene();
+    folder.write("boxes.obj", obj);
+    let before = folder.files();
+    // A signal that comes before anyone listens ends the program as well; then there is another.
+    for patience in [0.2, 0.5, 1.0, 2.0] {
+        let start = Instant::now();
+        let is_time = || start.elapsed() > Duration::from_secs_f64(patience);
+        let output = interrupted(folder.command("bake boxes.obj --json"), is_time);
+        let late = start.elapsed().as_secs_f64() - patience;
+        let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+        assert!(folder.files() == before, "it wrote");
+        if output.status.code().is_none() {
+            continue;
+        }
+        assert_eq!(output.status.code(), Some(130), "{stderr}");
+        assert!(late < 0.5, "{late} s");
+        assert!(
+            stderr.starts_with("interrupted before the first row"),
+            "{stderr}"
+        );
+        assert_eq!(stderr.lines().count(), 1, "{stderr}");
+        assert_eq!(command::one_object(&output.stdout)["interrupted"], true);
+        return;
+    }
+    panic!("nobody ever listened");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_main_job_that_is_interrupted_stops_before_its_next_file() {
+    let folder = Folder::new();
+    let picture = folder.path().join("out/light-ceiling.png");
+    let output = interrupted(folder.command("--json"), || picture.exists());
+    let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+    assert_eq!(output.status.code(), Some(130), "{stderr}");
+    assert_eq!(stderr.lines().count(), 1, "{stderr}");
+    let report = command::one_object(&output.stdout);
+    assert_eq!(report["interrupted"], true);
+    let files = folder.files();
+    let listed = report["files"].as_array().unwrap();
+    let mut listed: Vec<&str> = listed.iter().map(|name| name.as_str().unwrap()).collect();
+    assert!(listed[2] == "out/light-ceiling.png", "{listed:?}");
+    assert!(listed.len() < 10, "it went on: {listed:?}");
+    listed.sort_unstable();
+    assert!(files.keys().eq(&listed), "{listed:?}");
+}
+
+#[test]
+fn light_that_reaches_nothing_is_told() {
+    const OBJ: &str = "mtllib room.mtl\nv 0 0 0\nv 0 0 4\nv 4 0 4\nv 4 0 0\n\
+        v 1 2 1\nv 3 2 1\nv 3 2 3\nv 1 2 3\n";
+    let folder = with_scene();
+    let bulb = |y: f32| {
+        let entry = format!("name = 'bulb'\nkind = 'point'\nposition = [1, {y}, 1]\n");
+        folder.write("bulb.toml", format!("[[light]]\n{entry}emission = 1\n"));
+    };
+    let scene = |faces: &str| folder.write("floor.obj", OBJ.to_owned() + faces);
+    let white = "usemtl white\nf 1 2 3 4\n";
+    let down = "usemtl ceiling\nf 5 6 7 8\n";
+    let up = "usemtl sconce\nf 8 7 6 5\n";
+    let bake = "bake floor.obj --element 0.5 -o floor";
+
+    for (faces, expected) in [
+        (
+            up.to_owned() + white,
+            "light reaches no surface: turn lamps",
+        ),
+        (down.to_owned(), "no surface reflects light: give"),
+        (down.to_owned() + up, "no surface reflects light: give"),
+    ] {
+        scene(&faces);
+        let line = folder.refused(bake);
+        assert!(line.starts_with("relume: floor.obj: "), "{line}");
+        assert!(line.contains(expected), "{line}");
+    }
+    // On the floor is neither above nor below it.
+    scene(white);
+    let with_bulb = format!("{bake} --lights bulb.toml");
+    bulb(0.0);
+    assert!(
+        folder
+            .refused(&with_bulb)
+            .contains("light reaches no surface")
+    );
+    for y in [1e-3, -1e-3] {
+        bulb(y);
+        assert_eq!(folder.json(&with_bulb)["unlit"], json!([]), "{y}");
+    }
+
+    scene(&(down.to_owned() + up + white));
+    bulb(0.0);
+    assert_eq!(folder.json(&with_bulb)["unlit"], json!(["sconce", "bulb"]));
+    let (_, warning) = folder.told(&with_bulb);
+    let expected = "floor.obj: lights that reach no surface: sconce, bulb\n";
+    assert!(warning.starts_with(expected), "{warning}");
+    // What was not shot yet may still land.
+    let report = folder.json(&format!("{with_bulb} --plain --shots 0"));
+    assert_eq!(report["unlit"], json!(["bulb"]));
+    scene(&(down.to_owned() + white));
+    assert_eq!(folder.json(bake)["unlit"], json!([]));
+}
+
 #[test]
 fn wrong_scenes_are_one_line_and_exit_1() {
     let folder = with_scene();
@@ -1045,25 +1193,28 @@ fn a_light_that_nobody_sees_bakes() {
     let folder = with_scene();
     let obj = room::obj(false).replace("room.mtl", "hidden.mtl");
     folder.write("hidden.obj", obj + BOX);
-    for (reflectance, is_lit) in [(0.5, true), (0.0, false)] {
+    let bake = |reflectance: f32| {
         let mut mtl = room::mtl().replace("Ke", "# Ke");
         mtl += &format!("newmtl box\nKd {reflectance} 0 0\n");
         mtl += "newmtl lamp\nKd 0 0 0\nKe 1 1 1\n";
         folder.write("hidden.mtl", mtl);
-        let report = folder.json("bake hidden.obj --element 0.25");
-        assert_eq!(report["lights"], 1);
-        assert_eq!(report["elements"].as_u64() > Some(0), is_lit, "{report}");
-        folder.done("pack hidden.solution");
-        for file in ["hidden.solution", "hidden.atlas"] {
-            let outside = points(&folder, file);
-            assert_eq!(outside.len(), 9);
-            assert!(outside.iter().all(|row| row.value == [0.0; 3]));
-            let inside = elements(&folder, file, "");
-            assert_eq!(inside.iter().any(|row| row.value[0] > 0.0), is_lit);
-            // A sample at the edge of the box may see its inside.
-            let picture = png(&folder.done(&format!("relight {file} -o - {VIEW}")));
-            let brightest = picture.pixels().map(|p| p.0[0]).max();
-            assert!(brightest < Some(4), "{file} shows {brightest:?}");
-        }
+        "bake hidden.obj --element 0.25"
+    };
+    let report = folder.json(bake(0.5));
+    assert_eq!(report["lights"], 1);
+    folder.done("pack hidden.solution");
+    for file in ["hidden.solution", "hidden.atlas"] {
+        let outside = points(&folder, file);
+        assert_eq!(outside.len(), 9);
+        assert!(outside.iter().all(|row| row.value == [0.0; 3]));
+        let inside = elements(&folder, file, "");
+        assert!(inside.iter().any(|row| row.value[0] > 0.0));
+        // A sample at the edge of the box may see its inside.
+        let picture = png(&folder.done(&format!("relight {file} -o - {VIEW}")));
+        let brightest = picture.pixels().map(|p| p.0[0]).max();
+        assert!(brightest < Some(4), "{file} shows {brightest:?}");
     }
+    // A box that is black inside keeps all light.
+    let line = folder.refused(bake(0.0));
+    assert!(line.contains("light reaches no surface"), "{line}");
 }

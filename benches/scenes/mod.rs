@@ -66,7 +66,8 @@ pub fn meshed(builtin: &Builtin) -> OwnedMesh {
     let scene = &builtin.scene;
     let view = scene.view().expect("a legal scene");
     let bvh = Bvh::for_scene(&scene.view().expect("a legal scene"));
-    mesh::build(scene, &view, builtin.spacing, &bvh).expect("a mesh that fits")
+    let mut go_on = |_, _| ControlFlow::Continue(());
+    mesh::build(scene, &view, builtin.spacing, &bvh, &mut go_on).expect("a mesh that fits")
 }
 
 /// Irradiance in RGB with the mesh, in the given code.

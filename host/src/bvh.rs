@@ -212,7 +212,14 @@ impl Visibility for Bvh {
 /// The segment as a ray of parameter range [0, 1]; its end is left a little room for rounding.
 fn segment(from: Vec3, to: Vec3) -> Ray {
     let direction = Vec3A::from(to - from);
-    Ray::new(Vec3A::from(from), direction, 0.0, 1.0 + 1e-4)
+    let ray = Ray::new(Vec3A::from(from), direction, 0.0, 1.0 + 1e-4);
+    Ray {
+        // `Ray::new` takes steps below 1e-7 for none, and so misses boxes of that size.
+        inv_direction: direction
+            .recip()
+            .clamp(Vec3A::splat(f32::MIN), Vec3A::splat(f32::MAX)),
+        ..ray
+    }
 }
 
 #[cfg(test)]
@@ -238,11 +245,14 @@ mod tests {
         fn the_tree_sees_what_brute_force_sees(
             triangles in proptest::collection::vec([point(), point(), point()], 0..60),
             ends in proptest::collection::vec((point(), point()), 50),
+            size in prop_oneof![Just(1.0_f32), Just(1e-9), Just(1e-5), Just(1e8)],
         ) {
+            let triangles: Vec<_> = triangles.iter().map(|t| t.map(|v| v * size)).collect();
             let surfaces = surfaces(&triangles);
-            let bvh = Bvh::new(&surfaces, 2.0);
+            let bvh = Bvh::new(&surfaces, 2.0 * size);
             let brute = Occluders(&surfaces);
             for (from, to) in ends {
+                let (from, to) = (from * size, to * size);
                 prop_assert_eq!(bvh.sees(from, to), brute.sees(from, to), "{} {}", from, to);
                 let nearest = surfaces
                     .iter()

@@ -34,8 +34,8 @@ const STEPS: [f64; 4] = [
     0.538_597_257_223_61,
 ];
 
-/// By how much the light between elements has to be settled, relative.
-const TOLERANCE: f32 = 1e-5;
+/// Rays of every element that are cast together.
+pub const RAYS_PER_PASS: u32 = 16;
 
 /// Rays through a scene that end in elements of its mesh.
 #[derive(Debug)]
@@ -111,32 +111,31 @@ fn cosine_direction(normal: Vec3, u: f32, v: f32) -> Vec3 {
 /// Where the rays of every element end.
 #[derive(Debug, Default)]
 pub struct Hits {
-    /// One list for each pass: element by element, `per_pass` rays each.
+    /// One list for each pass, element by element.
     passes: Vec<Vec<u32>>,
-    per_pass: u32,
+}
+
+/// What bounces add to direct light.
+#[derive(Clone, Debug)]
+pub struct Bounced<const K: usize> {
+    /// Indirect irradiance of every element, W/m2.
+    pub indirect: Vec<Lanes<K>>,
+    /// Irradiance that the solution still lacks.
+    pub left: Vec<Lanes<K>>,
 }
 
 impl Hits {
-    /// No rays yet; every pass adds `per_pass` to each element.
-    #[must_use]
-    pub const fn new(per_pass: u32) -> Self {
-        Self {
-            passes: Vec::new(),
-            per_pass,
-        }
-    }
-
     /// Passes so far.
     #[must_use]
     pub const fn passes(&self) -> usize {
         self.passes.len()
     }
 
-    /// Casts one more pass.
+    /// Casts [`RAYS_PER_PASS`] more rays from every element.
     pub fn cast(&mut self, mesh: &Mesh, rays: &Rays) {
-        let first = self.passes.len() as u32 * self.per_pass;
-        let mut hits = vec![NOTHING; mesh.elements.len() * self.per_pass as usize];
-        hits.par_chunks_mut(self.per_pass as usize)
+        let first = self.passes.len() as u32 * RAYS_PER_PASS;
+        let mut hits = vec![NOTHING; mesh.elements.len() * RAYS_PER_PASS as usize];
+        hits.par_chunks_mut(RAYS_PER_PASS as usize)
             .zip(mesh.elements)
             .enumerate()
             .for_each(|(id, (hits, element))| {
@@ -150,40 +149,24 @@ impl Hits {
         self.passes.push(hits);
     }
 
-    /// `y_j = 1/R sum_r v_h(r)` for every element.
-    fn average<const K: usize>(&self, v: &[Lanes<K>], y: &mut [Lanes<K>]) {
-        let per_pass = self.per_pass as usize;
-        let share = 1.0 / (self.passes.len() * per_pass).max(1) as f32;
-        y.par_iter_mut().enumerate().for_each(|(id, y)| {
-            let mut sum = [[0.0; K]; 3];
-            for pass in &self.passes {
-                for hit in &pass[id * per_pass..(id + 1) * per_pass] {
-                    if let Some(value) = v.get(*hit as usize) {
-                        for (sum, value) in sum.iter_mut().zip(value) {
-                            for (sum, value) in sum.iter_mut().zip(value) {
-                                *sum += value;
-                            }
-                        }
-                    }
-                }
-            }
-            *y = sum.map(|channel| channel.map(|value| value * share));
-        });
-    }
-
-    /// Indirect irradiance of every element: all bounces of the direct one, lane by lane.
+    /// All bounces of direct light, until the residual of every lane is `tolerance` of its first bounce.
     #[must_use]
-    pub fn indirect<const K: usize>(&self, mesh: &Mesh, direct: &[Lanes<K>]) -> Vec<Lanes<K>> {
-        let n = direct.len();
-        let zero = vec![[[0.0; K]; 3]; n];
+    pub fn bounce<const K: usize>(
+        &self,
+        mesh: &Mesh,
+        direct: &[Lanes<K>],
+        tolerance: f32,
+    ) -> Bounced<K> {
+        let zero = vec![[[0.0; K]; 3]; direct.len()];
+        let passes: Vec<&[u32]> = self.passes.iter().map(Vec::as_slice).collect();
         let mut reflected = zero.clone();
         let mut transport = |v: &[Lanes<K>], y: &mut [Lanes<K>]| {
             reflect(mesh, v, &mut reflected);
-            self.average(&reflected, y);
+            average(&passes, &reflected, y);
         };
         // x = T (D + x), so x - T x = T D.
-        let mut residual = zero.clone();
-        transport(direct, &mut residual);
+        let mut left = zero.clone();
+        transport(direct, &mut left);
         let mut indirect = zero.clone();
         let mut work = [zero.clone(), zero.clone(), zero.clone(), zero];
         let [shadow, direction, along, across] = &mut work;
@@ -196,16 +179,67 @@ impl Hits {
         let apply = |v: &[Lanes<K>], y: &mut [Lanes<K>]| {
             transport(v, y);
             y.par_iter_mut().zip(v).for_each(|(y, v)| {
-                for (y, v) in y.iter_mut().zip(v) {
-                    for (y, v) in y.iter_mut().zip(v) {
-                        *y = v - *y;
-                    }
+                for (y, v) in y.as_flattened_mut().iter_mut().zip(v.as_flattened()) {
+                    *y = v - *y;
                 }
             });
         };
-        krylov::solve(apply, &mut indirect, &mut residual, work, TOLERANCE);
-        indirect
+        krylov::solve(apply, &mut indirect, &mut left, work, tolerance);
+        Bounced { indirect, left }
     }
+
+    /// Relative L1 error of every lane that the scatter of the rays leaves in `irradiance`, estimated
+    /// from the difference between even and odd passes: half of it is as large as the error of all.
+    #[must_use]
+    pub fn noise<const K: usize>(&self, mesh: &Mesh, irradiance: &[Lanes<K>]) -> [f32; K] {
+        let zero = vec![[[0.0; K]; 3]; irradiance.len()];
+        let mut reflected = zero.clone();
+        reflect(mesh, irradiance, &mut reflected);
+        let [even, odd] = [0, 1].map(|parity| {
+            let passes = self.passes.iter().skip(parity).step_by(2);
+            let passes: Vec<&[u32]> = passes.map(Vec::as_slice).collect();
+            let mut mean = zero.clone();
+            average(&passes, &reflected, &mut mean);
+            mean
+        });
+        let (mut error, mut all) = ([0.0_f64; K], [0.0_f64; K]);
+        let means = even.iter().zip(&odd).zip(irradiance).zip(mesh.elements);
+        for (((even, odd), irradiance), element) in means {
+            for ((even, odd), irradiance) in even.iter().zip(odd).zip(irradiance) {
+                for lane in 0..K {
+                    let area = f64::from(element.area);
+                    error[lane] += area * f64::from((even[lane] - odd[lane]).abs()) / 2.0;
+                    all[lane] += area * f64::from(irradiance[lane]);
+                }
+            }
+        }
+        let mut noise = [0.0; K];
+        for ((noise, error), all) in noise.iter_mut().zip(error).zip(all) {
+            *noise = if all > 0.0 { (error / all) as f32 } else { 0.0 };
+        }
+        noise
+    }
+}
+
+/// `y_j = 1/R sum_r v_h(r)` for every element, over some passes.
+fn average<const K: usize>(passes: &[&[u32]], v: &[Lanes<K>], y: &mut [Lanes<K>]) {
+    let per_pass = RAYS_PER_PASS as usize;
+    let share = 1.0 / (passes.len() * per_pass).max(1) as f32;
+    y.par_iter_mut().enumerate().for_each(|(id, y)| {
+        let mut sum = [[0.0; K]; 3];
+        for pass in passes {
+            for hit in &pass[id * per_pass..(id + 1) * per_pass] {
+                if let Some(value) = v.get(*hit as usize) {
+                    for (sum, value) in sum.iter_mut().zip(value) {
+                        for (sum, value) in sum.iter_mut().zip(value) {
+                            *sum += value;
+                        }
+                    }
+                }
+            }
+        }
+        *y = sum.map(|channel| channel.map(|value| value * share));
+    });
 }
 
 /// `y_j = rho_j v_j`.

@@ -8,13 +8,17 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
+use relume::color::Rgb;
 use serde_json::json;
 
 use super::{Outcome, human_bytes, output_path, tell, write_file};
-use crate::bake::{Method, Progress, Settings, bake};
+use crate::bake::{BakeError, Method, Progress, Settings, bake};
 use crate::import;
 use crate::scene::OwnedScene;
 use crate::solution::{self, Solution};
+
+/// Most names in a line for people; `--json` has them all.
+const MOST_NAMES: usize = 8;
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -35,7 +39,7 @@ pub struct Arguments {
     /// Stop when every light has at most this share of its power left to distribute
     #[arg(long, value_name = "R", default_value_t = Settings::default().residual, value_parser = positive)]
     residual: f32,
-    /// Stop after so many distinct rows (plain shots with --plain)
+    /// Stop after so many distinct rows and passes of 16 rays (plain shots with --plain)
     #[arg(long, value_name = "N")]
     shots: Option<u32>,
     /// As published: rows are not kept, and no ambient term stands for what is left
@@ -44,8 +48,9 @@ pub struct Arguments {
     /// Keep direct and indirect light apart
     #[arg(long)]
     split_direct: bool,
-    /// Who evaluates form factors: all cores, or the solver alone as on a device
-    #[arg(long, value_enum, default_value_t = MethodName::Host)]
+    /// How bounces are found: elements gather rays, patches shoot rows of exact form factors, or the
+    /// solver does that alone, as on a device
+    #[arg(long, value_enum, default_value_t = MethodName::Gather)]
     method: MethodName,
     /// Threads [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
@@ -54,7 +59,8 @@ pub struct Arguments {
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 enum MethodName {
-    Host,
+    Gather,
+    Rows,
     Device,
 }
 
@@ -75,7 +81,8 @@ impl Arguments {
             plain: self.plain,
             split_direct: self.split_direct,
             method: match self.method {
-                MethodName::Host => Method::Host,
+                MethodName::Gather => Method::Gather,
+                MethodName::Rows => Method::Rows,
                 MethodName::Device => Method::Device,
             },
             ..Settings::default()
@@ -104,6 +111,22 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     let baked = pool
         .install(|| watched(&imported.scene, &arguments.settings()))
         .with_context(|| path.clone())?;
+    let Some(baked) = baked else {
+        return Ok(Outcome {
+            interrupted: true,
+            report: json!({"interrupted": true}),
+        });
+    };
+    let unlit = baked.unlit(arguments.residual);
+    if !unlit.is_empty() {
+        let more = if unlit.len() > MOST_NAMES {
+            ", ..."
+        } else {
+            ""
+        };
+        let names = unlit[..unlit.len().min(MOST_NAMES)].join(", ");
+        tell!("{path}: lights that reach no surface: {names}{more}");
+    }
     let bytes = solution::write(&baked.solution);
     write_file(&output, &bytes)?;
     report(&baked, &output.display().to_string(), bytes.len());
@@ -130,6 +153,7 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
             "method": arguments.settings().method.name(),
             "seconds": baked.time.as_secs_f64(),
             "interrupted": baked.interrupted,
+            "unlit": unlit,
             "repairs": imported.repairs.lines(),
         }),
     })
@@ -148,13 +172,35 @@ impl Baked {
         let residuals = self.solution.lights.iter().map(|light| light.residual);
         residuals.fold(0.0, f32::max)
     }
+
+    /// Names of the lights that have shot their share and reached nothing.
+    fn unlit(&self, goal: f32) -> Vec<&str> {
+        let lights = self.solution.lights.iter().enumerate();
+        let values = &self.solution.contributions;
+        let mut lit = vec![false; lights.len()];
+        for element in values.chunks(lit.len()) {
+            for (lit, value) in lit.iter_mut().zip(element) {
+                *lit |= *value != Rgb::BLACK;
+            }
+        }
+        lights
+            .filter(|(tag, light)| !lit[*tag] && light.residual <= goal)
+            .map(|(_, light)| light.name.as_str())
+            .collect()
+    }
 }
 
 /// Set by the first Ctrl-C; the second one ends the program at once.
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// Bakes with a progress bar (on a terminal) and an ear for Ctrl-C.
-pub fn watched(scene: &OwnedScene, settings: &Settings) -> Result<Baked> {
+/// True when the user has asked to end, at any time since the first bake began.
+pub fn is_interrupted() -> bool {
+    INTERRUPTED.load(Ordering::Relaxed)
+}
+
+/// Bakes with a progress bar (on a terminal) and an ear for Ctrl-C; `None` when that came before
+/// there was a solution.
+pub fn watched(scene: &OwnedScene, settings: &Settings) -> Result<Option<Baked>> {
     // A handler that is already there does the same.
     let _ = ctrlc::set_handler(|| {
         if INTERRUPTED.swap(true, Ordering::Relaxed) {
@@ -162,16 +208,28 @@ pub fn watched(scene: &OwnedScene, settings: &Settings) -> Result<Baked> {
         }
     });
     let bar = ProgressBar::new(0).with_style(
-        ProgressStyle::with_template("{bar:30} {pos}/{len} rows  {msg}  {elapsed}")
+        ProgressStyle::with_template("{bar:30} {pos}/{len} {msg}  {elapsed}")
             .context("progress bar")?,
     );
     let start = Instant::now();
     let mut interrupted = false;
     let mut watch = |progress: Progress| {
-        bar.set_length(progress.patches as u64);
-        bar.set_position(progress.rows.into());
-        bar.set_message(format!("residual {:.5}", progress.residual));
-        interrupted = INTERRUPTED.load(Ordering::Relaxed);
+        let (done, all, what) = match progress {
+            Progress::Meshing { done, parts } => (done, parts, "before the first row".to_owned()),
+            Progress::Shooting {
+                rows,
+                most,
+                residual,
+            } => (
+                rows as usize,
+                most as usize,
+                format!("rows  residual {residual:.5}"),
+            ),
+        };
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+        bar.set_message(what);
+        interrupted = is_interrupted();
         if interrupted {
             ControlFlow::Break(())
         } else {
@@ -180,11 +238,15 @@ pub fn watched(scene: &OwnedScene, settings: &Settings) -> Result<Baked> {
     };
     let solution = bake(scene, settings, &mut watch);
     bar.finish_and_clear();
-    Ok(Baked {
+    if matches!(solution, Err(BakeError::Interrupted)) {
+        tell!("interrupted before the first row: there is nothing to write");
+        return Ok(None);
+    }
+    Ok(Some(Baked {
         solution: solution?,
         time: start.elapsed(),
         interrupted,
-    })
+    }))
 }
 
 fn report(baked: &Baked, file: &str, bytes: usize) {

@@ -10,9 +10,10 @@ use relume::atlas::{Atlas, Channels, Quantity};
 use relume::code::Code;
 use relume::color::Rgb;
 use serde_json::json;
+use thiserror::Error;
 use tiny_skia::Pixmap;
 
-use super::bake::{Baked, watched};
+use super::bake::{Baked, is_interrupted, watched};
 use super::relight::BACKGROUND;
 use super::{Outcome, human_bytes, tell, write_file};
 use crate::bake::Settings;
@@ -46,8 +47,18 @@ const MIXES: [(&str, &[&str]); 5] = [
 /// Files that were written, in order.
 struct Folder(Vec<PathBuf>);
 
+/// Ctrl-C came; what was written stays.
+#[derive(Debug, Error)]
+#[error("interrupted")]
+struct Interrupted;
+
 impl Folder {
+    /// # Errors
+    /// [`Interrupted`] after Ctrl-C, so that nothing follows the file that it found half-written.
     fn write(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
+        if is_interrupted() {
+            return Err(Interrupted.into());
+        }
         let path = Path::new(FOLDER).join(name);
         write_file(&path, bytes)?;
         self.0.push(path);
@@ -120,6 +131,22 @@ impl Stage<'_> {
 }
 
 pub fn run() -> Result<Outcome> {
+    let mut folder = Folder(Vec::new());
+    match make(&mut folder) {
+        Ok(report) => Ok(Outcome::done(report)),
+        Err(error) if error.is::<Interrupted>() => {
+            tell!("interrupted: {FOLDER}/ got {} files", folder.0.len());
+            Ok(Outcome {
+                interrupted: true,
+                report: json!({"interrupted": true, "files": folder.0}),
+            })
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// Bakes, packs, draws and compares; returns what `--json` prints.
+fn make(folder: &mut Folder) -> Result<serde_json::Value> {
     let Builtin {
         scene,
         spacing,
@@ -130,7 +157,7 @@ pub fn run() -> Result<Outcome> {
         element: Some(spacing.element),
         ..Settings::default()
     };
-    let baked = watched(&scene, &settings)?;
+    let baked = watched(&scene, &settings)?.ok_or(Interrupted)?;
     let solution = &baked.solution;
     let format = Format {
         code: Code::Exp8s,
@@ -144,7 +171,6 @@ pub fn run() -> Result<Outcome> {
     let mut error = packing_error(solution, &atlas)?;
 
     fs::create_dir_all(FOLDER).with_context(|| format!("{FOLDER}: cannot be made"))?;
-    let mut folder = Folder(Vec::new());
     folder.write("cornell.solution", &solution_bytes)?;
     folder.write("cornell.atlas", &atlas_bytes)?;
     let viewpoint = Viewpoint {
@@ -158,14 +184,14 @@ pub fn run() -> Result<Outcome> {
         atlas,
         camera: Camera::new(viewpoint, SIDE, SIDE)?,
     };
-    let relightings = pictures(&stage, &mut folder)?;
+    let relightings = pictures(&stage, folder)?;
     for relit in &relightings {
         if relit.max_codes > error.codes {
             error.codes = relit.max_codes;
             error.worst_state.clone_from(&relit.name);
         }
     }
-    light_layers(&stage, &mut folder)?;
+    light_layers(&stage, folder)?;
     let report = report(
         &baked,
         &error,
@@ -180,9 +206,7 @@ pub fn run() -> Result<Outcome> {
         folder.0.len()
     );
 
-    Ok(Outcome {
-        interrupted: baked.interrupted,
-        report: json!({
+    Ok(json!({
             "lights": solution.lights.len(),
             "elements": solution.mesh.elements.len(),
             "patches": solution.mesh.patches.len(),
@@ -200,8 +224,7 @@ pub fn run() -> Result<Outcome> {
                 "name": r.name, "exposure": r.exposure, "max_error_codes": r.max_codes,
             })).collect::<Vec<_>>(),
             "files": folder.0,
-        }),
-    })
+    }))
 }
 
 /// Pictures of every light alone and of every mix, their errors, and one sheet of them all.

@@ -1,18 +1,23 @@
 //! Meshing on the host: spacing from the scene's size, faces that light reaches, textures.
 
+mod centre;
 mod locate;
 mod reach;
 mod split;
+
+use std::ops::ControlFlow;
 
 use relume::mesh::{
     Counts, Element, Face, Mesh, MeshError, MeshSink, Patch, Side, Spacing, element_count,
     subdivide,
 };
 use relume::scene::Scene;
+use thiserror::Error;
 
 use crate::bvh::Bvh;
 use crate::scene::OwnedScene;
 
+pub use centre::{Centred, centred, returned};
 pub use locate::Locator;
 pub use split::{Direct, Split, split};
 
@@ -125,17 +130,32 @@ fn count(scene: &Scene, spacing: Spacing) -> u64 {
     element_count(scene, spacing).unwrap_or(u64::MAX)
 }
 
+/// Why there is no mesh.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+pub enum BuildError {
+    /// The scene cannot be divided so.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// The watcher broke.
+    #[error("interrupted")]
+    Interrupted,
+}
+
 /// Divides the scene; faces that no light reaches are left out before anything is numbered.
 ///
+/// The search for them can take seconds. `watch` is told how many parts of the scene it has looked at,
+/// and how many there are; when it breaks, there is no mesh.
+///
 /// # Errors
-/// [`MeshError`] as [`subdivide`] reports it.
+/// [`BuildError`]: as [`subdivide`] reports it, or interrupted.
 pub fn build(
     scene: &OwnedScene,
     view: &Scene,
     spacing: Spacing,
     bvh: &Bvh,
-) -> Result<OwnedMesh, MeshError> {
-    let reached = reach::reached_faces(view, spacing, bvh)?;
+    watch: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
+) -> Result<OwnedMesh, BuildError> {
+    let reached = reach::reached_faces(view, spacing, bvh, watch)?;
     let mut mesh = OwnedMesh::default();
     let keep = |surface: u32, side: Side| reached.contains(surface, side);
     let _: Counts = subdivide(view, spacing, keep, &mut mesh)?;
@@ -173,6 +193,11 @@ mod tests {
 
     fn surface(vertices: [Vec3; 4], reflectance: f32) -> Surface {
         Surface::new(0, &vertices, Rgb::splat(reflectance)).unwrap()
+    }
+
+    fn built(scene: &OwnedScene, view: &Scene, spacing: Spacing) -> OwnedMesh {
+        let mut go_on = |_, _| ControlFlow::Continue(());
+        build(scene, view, spacing, &Bvh::for_scene(view), &mut go_on).unwrap()
     }
 
     /// Walls of the box from -size to size around `at`, all facing inwards.
@@ -226,7 +251,7 @@ mod tests {
             let spot = [Luminaire::new(0, Rgb::WHITE, source).unwrap()];
             let view = Scene::new(&scene.surfaces, &spot, 1).unwrap();
             let spacing = super::spacing(&view, None, None);
-            let mesh = build(&scene, &view, spacing, &Bvh::for_scene(&view)).unwrap();
+            let mesh = built(&scene, &view, spacing);
             // Walls face inwards: fronts of the room and backs of the boxes are lit.
             let found: Vec<(u32, Side)> = mesh.faces.iter().map(|f| (f.surface, f.side)).collect();
             let room = (0..6).map(|surface| (surface, Side::Front));
@@ -264,7 +289,7 @@ mod tests {
             patch: 1.0,
             element: 0.5,
         };
-        let mesh = build(&scene, &view, spacing, &Bvh::for_scene(&view)).unwrap();
+        let mesh = built(&scene, &view, spacing);
         let faces: Vec<(u32, Side)> = mesh.faces.iter().map(|f| (f.surface, f.side)).collect();
         let expected: Vec<(u32, Side)> = (0..6)
             .map(|i| (i, Side::Front))
@@ -272,5 +297,46 @@ mod tests {
             .chain([(12, Side::Front)])
             .collect();
         assert_eq!(faces, expected);
+    }
+
+    /// A floor and a wall under lamps of any size and number: the default mesh of what is lit does not
+    /// depend on them, and lamps have a bounded number of patches.
+    #[test]
+    fn lamps_larger_than_the_room_leave_its_mesh_alone() {
+        let floor = [(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)];
+        let floor = floor.map(|(x, y)| Vec3::new(x, y, 0.0));
+        let wall = [(0.0, 0.0), (0.0, 3.0), (4.0, 3.0), (4.0, 0.0)];
+        let wall = wall
+            .map(|(x, z)| Vec3::new(x, 4.0, z))
+            .map(|v| v - Vec3::Y * 4.0);
+        let emission = Emission {
+            light: 0,
+            share: Rgb::WHITE,
+        };
+        let mut meshes = [(1.0, 1), (100.0, 1), (1e4, 1), (0.25, 64), (0.01, 1024)]
+            .into_iter()
+            .map(|(size, rows): (f32, i32)| {
+                let lamp = |i: i32| {
+                    let at = Vec3::new(i as f32 * 0.02, i as f32 * 0.01, 10.0);
+                    let corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)];
+                    let corners = corners.map(|(x, y)| at + Vec3::new(x, y, 0.0) * size / 2.0);
+                    surface(corners, 0.0).emitting(0, emission).unwrap()
+                };
+                let room = [surface(floor, 0.5), surface(wall, 0.5)];
+                let scene = OwnedScene {
+                    surfaces: room.into_iter().chain((0..rows).map(lamp)).collect(),
+                    ..OwnedScene::default()
+                };
+                let view = Scene::new(&scene.surfaces, &[], 1).unwrap();
+                let spacing = super::spacing(&view, None, None);
+                let mesh = built(&scene, &view, spacing);
+                let of_lamps = mesh.patches.iter().filter(|patch| patch.face > 1);
+                let of_lamps = of_lamps.count();
+                assert!(of_lamps <= 1024 + rows as usize, "{size}: {of_lamps}");
+                (spacing, mesh.elements)
+            });
+        let first = meshes.next().unwrap();
+        assert!(first.1.len() > 6000);
+        assert!(meshes.all(|mesh| mesh == first));
     }
 }

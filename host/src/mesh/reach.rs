@@ -6,20 +6,23 @@
 //! Walks go through points, not parts, so a floor that is lit around a closed box does not light the
 //! inside of the box; two, because rounding lets one walk in ten thousand through an edge. Each
 //! part, as large as a patch or the default patch, whichever is larger, starts 32 walks of up to 16
-//! rays. Assumption: a face that all of them miss gets too little light to matter.
+//! rays. Work is bounded however many lights there are: of lamps' patches, and of luminaires, 4096 cast
+//! rays and a part looks at 256; a place on a walk looks at 16 luminaires. Assumption: a face that all
+//! of them miss gets too little light to matter.
 
 use std::f32::consts::TAU;
+use std::ops::ControlFlow;
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use relume::form_factor::Shooter;
 use relume::geometry::{Polygon, from_unit_square, gauss_points};
 use relume::luminaire;
-use relume::mesh::{Face, Mesh, MeshError, Side, Spacing, is_face, subdivide};
+use relume::mesh::{Face, Mesh, Side, Spacing, is_face, subdivide};
 use relume::scene::{Scene, Source};
 use relume::visibility::Visibility;
 
-use super::OwnedMesh;
+use super::{BuildError, OwnedMesh};
 use crate::bvh::{Bvh, Hit};
 use crate::noise;
 
@@ -34,6 +37,18 @@ const WITNESSES: usize = 2;
 
 /// Lit points, and points of lamps, that a point on a walk looks at.
 const GLANCES: u64 = 4;
+
+/// Patches of lamps, and luminaires, that a part looks at.
+const LIGHTS_PER_PART: usize = 256;
+
+/// Luminaires that a place on a walk looks at.
+const LIGHTS_PER_PLACE: usize = 16;
+
+/// Patches of lamps, and luminaires, that cast rays.
+const LIGHTS_THAT_CAST: usize = 4096;
+
+/// Parts that are looked at before the watcher is asked again: some tenths of a second at worst.
+const PARTS_AT_ONCE: usize = 64;
 
 /// Rays that light casts from each luminaire, and from each patch of a lamp.
 const CASTS: u64 = 64;
@@ -63,15 +78,17 @@ const fn side_index(side: Side) -> usize {
     }
 }
 
-/// Finds the faces that light reaches.
+/// Finds the faces that light reaches. `watch` is told the parts that are done and their number; when
+/// it breaks, the search ends.
 ///
 /// # Errors
-/// [`MeshError`] when the parts would be too many.
+/// [`BuildError`] when the parts would be too many, or the watcher broke.
 pub fn reached_faces(
     scene: &Scene,
     spacing: Spacing,
     bvh: &Bvh,
-) -> Result<ReachedFaces, MeshError> {
+    watch: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
+) -> Result<ReachedFaces, BuildError> {
     let mut parts = OwnedMesh::default();
     let length = spacing.patch.max(super::spacing(scene, None, None).patch);
     let coarse = Spacing {
@@ -82,25 +99,32 @@ pub fn reached_faces(
     let mesh = parts.view();
     let surroundings = Surroundings::new(&mesh, scene, bvh);
 
-    let mut sides = vec![[false; 2]; scene.surfaces().len()];
-    let reached: Vec<bool> = (0..mesh.patches.len())
-        .into_par_iter()
-        .map(|part| surroundings.reaches(&mesh, part as u32))
-        .collect();
-    for (part, reached) in mesh.patches.iter().zip(reached) {
-        let face = &mesh.faces[part.face as usize];
-        sides[face.surface as usize][side_index(face.side)] |= reached;
-    }
     // Lamps start light; what reflects nothing stores nothing, so nothing is gained by leaving it out.
     let reflects = |face: &Face| {
         !scene.surfaces()[face.surface as usize]
             .reflectance()
             .is_black()
     };
-    for face in mesh.faces {
-        if face.emission.is_some() || !reflects(face) {
-            sides[face.surface as usize][side_index(face.side)] = true;
+    let starts_reached = |face: &Face| face.emission.is_some() || !reflects(face);
+    let mut reached: Vec<bool> = mesh.faces.iter().map(starts_reached).collect();
+    let face_of = |part: usize| mesh.patches[part].face as usize;
+    let count = mesh.patches.len();
+    for first in (0..count).step_by(PARTS_AT_ONCE) {
+        if watch(first, count).is_break() {
+            return Err(BuildError::Interrupted);
         }
+        let lit: Vec<usize> = (first..count.min(first + PARTS_AT_ONCE))
+            .into_par_iter()
+            .filter(|part| !reached[face_of(*part)] && surroundings.reaches(&mesh, *part as u32))
+            .collect();
+        for part in lit {
+            reached[face_of(part)] = true;
+        }
+    }
+
+    let mut sides = vec![[false; 2]; scene.surfaces().len()];
+    for (face, reached) in mesh.faces.iter().zip(reached) {
+        sides[face.surface as usize][side_index(face.side)] = reached;
     }
     Ok(ReachedFaces(sides))
 }
@@ -149,7 +173,7 @@ impl<'a> Surroundings<'a> {
     /// walks that escape ask them themselves.
     fn cast_light(&self) -> Vec<Place> {
         let mut lit = Vec::new();
-        for (lamp, number) in self.lamps.iter().zip(0_u64..) {
+        for (number, lamp) in some_of(&self.lamps, LIGHTS_THAT_CAST, 0) {
             for cast in 0..CASTS {
                 let seed = (number * CASTS + cast) * 4;
                 let at = Vec2::new(noise::unit(seed), noise::unit(seed + 1));
@@ -160,7 +184,7 @@ impl<'a> Surroundings<'a> {
                 lit.extend(self.next(start, seed + 2));
             }
         }
-        for (luminaire, number) in self.scene.luminaires().iter().zip(0_u64..) {
+        for (number, luminaire) in some_of(self.scene.luminaires(), LIGHTS_THAT_CAST, 0) {
             let (position, axis, least) = match *luminaire.source() {
                 Source::Point { position } => (position, Vec3::Z, -1.0),
                 Source::Spot {
@@ -189,17 +213,15 @@ impl<'a> Surroundings<'a> {
         let Some(polygon) = mesh.patch_polygon(part) else {
             return false;
         };
-        self.lights_directly(&polygon) || self.walks_lead_to_light(&polygon, part)
+        self.lights_directly(&polygon, part) || self.walks_lead_to_light(&polygon, part)
     }
 
-    fn lights_directly(&self, polygon: &Polygon) -> bool {
-        let luminaires = self.scene.luminaires();
-        self.shooters
-            .iter()
-            .any(|lamp| lamp.form_factor(polygon, self.bvh) > SLIVER)
-            || luminaires
-                .iter()
-                .any(|l| luminaire::irradiance(l.source(), polygon, self.far, self.bvh) > 0.0)
+    fn lights_directly(&self, polygon: &Polygon, part: u32) -> bool {
+        let (most, seed) = (LIGHTS_PER_PART, u64::from(part));
+        some_of(&self.shooters, most, seed)
+            .any(|(_, lamp)| lamp.form_factor(polygon, self.bvh) > SLIVER)
+            || some_of(self.scene.luminaires(), most, seed)
+                .any(|(_, l)| luminaire::irradiance(l.source(), polygon, self.far, self.bvh) > 0.0)
     }
 
     fn walks_lead_to_light(&self, polygon: &Polygon, part: u32) -> bool {
@@ -260,23 +282,21 @@ impl<'a> Surroundings<'a> {
     /// True when a point gets light: from a luminaire, a lamp or a lit point.
     fn is_lit(&self, place: Place, seed: u64) -> bool {
         let Place { position, normal } = place;
-        let luminaires = self.scene.luminaires();
-        luminaires
-            .iter()
-            .any(|l| luminaire::at_point(l.source(), position, normal, self.far, self.bvh) > 0.0)
-            || (0..GLANCES).any(|glance| {
-                let seed = seed + 4 * glance;
-                let lamp = pick(&self.lamps, seed).map(|lamp| {
-                    let at = Vec2::new(noise::unit(seed + 1), noise::unit(seed + 2));
-                    Place {
-                        position: from_unit_square(lamp, at).0,
-                        normal: lamp.normal(),
-                    }
-                });
-                let lit = pick(&self.lit, seed + 3).copied();
-                lamp.is_some_and(|lamp| self.exchange(place, lamp))
-                    || lit.is_some_and(|lit| self.exchange(place, lit))
-            })
+        some_of(self.scene.luminaires(), LIGHTS_PER_PLACE, seed).any(|(_, l)| {
+            luminaire::at_point(l.source(), position, normal, self.far, self.bvh) > 0.0
+        }) || (0..GLANCES).any(|glance| {
+            let seed = seed + 4 * glance;
+            let lamp = pick(&self.lamps, seed).map(|lamp| {
+                let at = Vec2::new(noise::unit(seed + 1), noise::unit(seed + 2));
+                Place {
+                    position: from_unit_square(lamp, at).0,
+                    normal: lamp.normal(),
+                }
+            });
+            let lit = pick(&self.lit, seed + 3).copied();
+            lamp.is_some_and(|lamp| self.exchange(place, lamp))
+                || lit.is_some_and(|lit| self.exchange(place, lit))
+        })
     }
 
     /// True when two places face and see each other.
@@ -287,6 +307,13 @@ impl<'a> Surroundings<'a> {
             && ray.dot(b.normal) < -least
             && self.bvh.sees(a.position, b.position)
     }
+}
+
+/// At most `most` of `items`, with their numbers, evenly spread; all of them if they are no more.
+fn some_of<T>(items: &[T], most: usize, seed: u64) -> impl Iterator<Item = (u64, &T)> {
+    let step = items.len().div_ceil(most).max(1);
+    let first = (noise::unit(seed) * step as f32) as usize;
+    (0..).zip(items).skip(first).step_by(step)
 }
 
 fn pick<T>(items: &[T], seed: u64) -> Option<&T> {

@@ -5,7 +5,7 @@
 //! of `ceil(edge / length)` parts along each of its two directions; a triangle becomes `n * n`
 //! triangles similar to it. Elements are numbered face by face; inside a quad the edge
 //! `v0 -> v3` is the outer loop and `v0 -> v1` the inner one, inside a triangle rows of
-//! growing `t`. A face of reflectance 0 has no elements, and patches only if it emits.
+//! growing `t`. A face of reflectance 0 has no elements, and patches only if it emits, a bounded number.
 //!
 //! Counts: ids are `u32`; an edge is divided into at most 65 535 elements; [`MeshStorage`], made
 //! for devices, holds at most 65 536 patches, so that 16 bits name one.

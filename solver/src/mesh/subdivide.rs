@@ -1,5 +1,7 @@
 //! Division of every polygon into equal parts: grids on quads, similar triangles on triangles.
 
+use core::f32::consts::SQRT_2;
+
 use glam::Vec2;
 
 use super::{Element, Face, MeshError, MeshSink, Patch, Side};
@@ -7,10 +9,13 @@ use crate::geometry::Polygon;
 use crate::math;
 use crate::scene::{Scene, Surface};
 
+/// Patches, more than there are black lamps, into which all black lamps together are cut.
+const MOST_LAMP_PATCHES: u64 = 1024;
+
 /// Longest edges that a division aims at, in m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spacing {
-    /// Longest edge of a patch.
+    /// Longest edge of a patch; lamps of reflectance 0 may have longer ones, see [`subdivide`].
     pub patch: f32,
     /// Longest edge of an element.
     pub element: f32,
@@ -30,7 +35,9 @@ pub struct Counts {
 /// Divides every face for which `keep(surface, side)` holds into patches and elements.
 ///
 /// The front of every surface is a face, the back of every two-sided one another; a face that
-/// neither reflects nor emits has no patches.
+/// neither reflects nor emits has no patches. Lamps of reflectance 0 receive nothing, and a lamp may
+/// be a thousand times larger than the room that it lights: while all of them together would have
+/// over 1024 patches more than there are lamps, their patches are lengthened by `sqrt 2`.
 ///
 /// # Errors
 /// [`MeshError`]: a bad spacing, an edge that would be cut too often, or full storage.
@@ -46,14 +53,48 @@ pub fn subdivide(
         }
     }
     let mut counts = Counts::default();
+    let lamp_patch = lamp_patch(scene, spacing.patch);
     for (surface, index) in scene.surfaces().iter().zip(0..) {
+        let own = if surface.reflectance().is_black() {
+            let length = surface.emission().map_or(f32::INFINITY, |_| lamp_patch);
+            Spacing {
+                patch: length,
+                element: length,
+            }
+        } else {
+            spacing
+        };
         for side in [Side::Front, Side::Back] {
             if is_face(surface, side) && keep(index, side) {
-                subdivide_face(surface, index, side, spacing, &mut counts, sink)?;
+                subdivide_face(surface, index, side, own, &mut counts, sink)?;
             }
         }
     }
     Ok(counts)
+}
+
+fn is_black_lamp(surface: &Surface) -> bool {
+    surface.emission().is_some() && surface.reflectance().is_black()
+}
+
+/// Longest edge of a patch of the black lamps, where that of other patches is `patch`.
+fn lamp_patch(scene: &Scene, patch: f32) -> f32 {
+    let surfaces = scene.surfaces().iter();
+    let lamps = surfaces.filter(|s| is_black_lamp(s)).map(Surface::polygon);
+    let most = MOST_LAMP_PATCHES + lamps.clone().count() as u64;
+    let longest = lamps.clone().map(Polygon::longest_edge).fold(0.0, f32::max);
+    let count = |length: f32| {
+        let grids = lamps.clone().map(|lamp| {
+            let grid = Grid::new(lamp, 1, length);
+            grid.map_or(u64::from(u32::MAX), |g| g.cells(lamp.is_triangle()).into())
+        });
+        grids.sum::<u64>()
+    };
+    let mut length = patch;
+    while length < longest && count(length) > most {
+        length *= SQRT_2;
+    }
+    length
 }
 
 /// How many elements [`subdivide`] would make of all faces, without making them.
@@ -361,5 +402,41 @@ mod tests {
             (mesh.faces[2].element_count, mesh.faces[3].element_count),
             (0, 0)
         );
+    }
+
+    #[test]
+    fn a_lamp_of_any_size_and_shape_has_a_bounded_number_of_patches() {
+        let shapes: [[Vec3; 4]; 3] = [
+            SQUARE.map(|v| v * 1e2),
+            SQUARE.map(|v| v * 1e6),
+            SQUARE.map(|v| v * Vec3::new(1e5, 1.0, 1.0)),
+        ];
+        for shape in shapes {
+            for count in [3, 4] {
+                let emission = Emission {
+                    light: 0,
+                    share: Rgb::WHITE,
+                };
+                let lamp = Surface::new(1, &shape[..count], Rgb::BLACK)
+                    .and_then(|lamp| lamp.emitting(1, emission))
+                    .unwrap();
+                let small = Surface::new(2, &SQUARE, Rgb::BLACK)
+                    .and_then(|lamp| lamp.emitting(2, emission))
+                    .unwrap();
+                let surfaces = [surface(&SQUARE), lamp, small];
+                let scene = Scene::new(&surfaces, &[], 1).unwrap();
+                let patches = |keep: u32| {
+                    let mut storage = MeshStorage::<3, 2048, 24>::new();
+                    let keep = |surface, _| surface == keep;
+                    let counts = subdivide(&scene, SPACING, keep, &mut storage).unwrap();
+                    counts.patches
+                };
+                // What reflects is divided as ever.
+                assert_eq!(patches(0), 6);
+                let lamps = patches(1) + patches(2);
+                // A length too short by sqrt 2 had doubled the number at most.
+                assert!((300..=1024 + 2).contains(&lamps), "{shape:?}: {lamps}");
+            }
+        }
     }
 }

@@ -1,0 +1,227 @@
+//! Bounces that elements gather by rays.
+
+use relume::color::Rgb;
+use relume::luminaire;
+use relume::refine::Lanes;
+
+use super::direct::{self, DirectRow, lamp_count};
+use super::{BakeError, Job, LANES, Settings, Solved};
+use crate::bvh::Bvh;
+use crate::gather::{Hits, RAYS_PER_PASS, Rays};
+use crate::mesh::OwnedMesh;
+use crate::rows::Parallel;
+
+/// Most passes: 64 * 16 rays for every element.
+const MOST_PASSES: u32 = 64;
+
+/// Most bytes of what rays hit.
+const HIT_BYTES: usize = 2 << 30;
+
+/// Passes after which the noise is looked at for the first time; then whenever they have doubled.
+const FIRST_LOOK: u32 = 8;
+
+/// Direct light, then passes of rays until their noise is small enough or the job ends.
+pub(super) fn gather(job: &mut Job, mesh: OwnedMesh, bvh: &Bvh) -> Result<Solved, BakeError> {
+    let view = mesh.view();
+    let pass_bytes = mesh.elements.len() * RAYS_PER_PASS as usize * 4;
+    let passes = MOST_PASSES
+        .min((HIT_BYTES / pass_bytes.max(1)) as u32)
+        .max(1);
+    let most = lamp_count(&mesh) + passes;
+
+    let mut light = Light::new(&mesh, job.lights());
+    let filler = Parallel::new(&view, bvh);
+    let lamps = direct::visit(job, &mesh, &filler, most, true, |row| {
+        light.add(&row);
+        Ok(())
+    })?;
+    light.bounce(&mesh, &Hits::default(), job.settings.residual);
+    let rays = Rays::new(view, bvh, luminaire::far(job.scene));
+    let mut hits = Hits::default();
+    let mut next_look = FIRST_LOOK;
+    while lamps.are_complete && (hits.passes() as u32) < passes {
+        let rows = lamps.rows + hits.passes() as u32;
+        if job.ends(rows, most, light.residual()) {
+            break;
+        }
+        hits.cast(&view, &rays);
+        if hits.passes() as u32 == next_look.min(passes) {
+            light.bounce(&mesh, &hits, job.settings.residual);
+            if light.noise(&mesh, &hits) <= job.settings.noise {
+                break;
+            }
+            next_look *= 2;
+        }
+    }
+    light.bounce(&mesh, &hits, job.settings.residual);
+    Ok(light.solved(lamps.rows + hits.passes() as u32, mesh, job.settings))
+}
+
+/// Light on the elements.
+struct Light {
+    lights: usize,
+    blocks: Vec<Block>,
+    /// Passes that the indirect light was solved with.
+    passes: usize,
+}
+
+/// A block of lights.
+struct Block {
+    direct: Vec<Lanes<LANES>>,
+    indirect: Vec<Lanes<LANES>>,
+    /// Irradiance that was found and has not been reflected yet.
+    left: Vec<Lanes<LANES>>,
+    /// Power of each light, W.
+    emitted: [f32; LANES],
+    /// Power of lamps that have not been shot, W.
+    waiting: [f32; LANES],
+    residuals: [f32; LANES],
+}
+
+impl Light {
+    fn new(mesh: &OwnedMesh, lights: usize) -> Self {
+        let dark = vec![[[0.0; LANES]; 3]; mesh.elements.len()];
+        let block = || Block {
+            direct: dark.clone(),
+            indirect: dark.clone(),
+            left: Vec::new(),
+            emitted: [0.0; LANES],
+            waiting: [0.0; LANES],
+            residuals: [1.0; LANES],
+        };
+        let mut light = Self {
+            lights,
+            blocks: std::iter::repeat_with(block)
+                .take(lights.div_ceil(LANES))
+                .collect(),
+            passes: 0,
+        };
+        let view = mesh.view();
+        for (patch, id) in mesh.patches.iter().zip(0..) {
+            if let Some(emission) = view.patch_emission(id) {
+                let (block, lane) = light.lane(emission.light);
+                block.emitted[lane] += patch.area * total(emission.share);
+                block.waiting[lane] += patch.area * total(emission.share);
+            }
+        }
+        light
+    }
+
+    fn lane(&mut self, light: u32) -> (&mut Block, usize) {
+        (
+            &mut self.blocks[light as usize / LANES],
+            light as usize % LANES,
+        )
+    }
+
+    fn add(&mut self, row: &DirectRow) {
+        let (block, lane) = self.lane(row.light);
+        for (lanes, factor) in block.direct.iter_mut().zip(row.row) {
+            for (channel, share) in lanes.iter_mut().zip(row.share.to_array()) {
+                channel[lane] += share * factor;
+            }
+        }
+        let power = row.power * total(row.share);
+        match row.patch {
+            Some(_) => block.waiting[lane] = (block.waiting[lane] - power).max(0.0),
+            None => block.emitted[lane] += power,
+        }
+    }
+
+    /// Solves for the bounces along the rays there are.
+    fn bounce(&mut self, mesh: &OwnedMesh, hits: &Hits, residual: f32) {
+        if self.passes > 0 && self.passes == hits.passes() {
+            return;
+        }
+        self.passes = hits.passes();
+        for block in &mut self.blocks {
+            block.left.clone_from(&block.direct);
+            if self.passes > 0 {
+                let bounced = hits.bounce(&mesh.view(), &block.direct, residual / 10.0);
+                (block.indirect, block.left) = (bounced.indirect, bounced.left);
+            }
+            block.measure(mesh);
+        }
+    }
+
+    /// The largest residual of all lights.
+    fn residual(&self) -> f32 {
+        let residuals = self.blocks.iter().flat_map(|block| block.residuals);
+        residuals.take(self.lights).fold(0.0, f32::max)
+    }
+
+    /// Relative L1 error of the worst light by the scatter of the rays.
+    fn noise(&self, mesh: &OwnedMesh, hits: &Hits) -> f32 {
+        let noise = self.blocks.iter().flat_map(|block| {
+            let irradiance = block.irradiance();
+            hits.noise(&mesh.view(), &irradiance)
+        });
+        noise.take(self.lights).fold(0.0, f32::max)
+    }
+
+    fn solved(self, rows: u32, mesh: OwnedMesh, settings: &Settings) -> Solved {
+        let irradiance: Vec<_> = self.blocks.iter().map(Block::irradiance).collect();
+        let direct: Vec<_> = self.blocks.iter().map(|b| b.direct.clone()).collect();
+        let residuals = self.blocks.iter().flat_map(|block| block.residuals);
+        Solved {
+            contributions: by_element(&irradiance, self.lights),
+            direct: settings
+                .split_direct
+                .then(|| by_element(&direct, self.lights)),
+            residuals: residuals.take(self.lights).collect(),
+            rows,
+            mesh,
+        }
+    }
+}
+
+impl Block {
+    fn irradiance(&self) -> Vec<Lanes<LANES>> {
+        let parts = self.direct.iter().zip(&self.indirect);
+        let sum = |(direct, indirect): (&Lanes<LANES>, &Lanes<LANES>)| {
+            let mut sum = *direct;
+            for (sum, value) in sum
+                .as_flattened_mut()
+                .iter_mut()
+                .zip(indirect.as_flattened())
+            {
+                *sum += value;
+            }
+            sum
+        };
+        parts.map(sum).collect()
+    }
+
+    /// Residuals: what is not reflected yet, and what lamps have not shot, over what was emitted.
+    fn measure(&mut self, mesh: &OwnedMesh) {
+        let mut unshot = self.waiting;
+        for (lanes, element) in self.left.iter().zip(&mesh.elements) {
+            for (channel, rho) in lanes.iter().zip(element.reflectance.to_array()) {
+                for (unshot, left) in unshot.iter_mut().zip(channel) {
+                    *unshot += element.area * rho * left.abs();
+                }
+            }
+        }
+        for ((residual, unshot), emitted) in self.residuals.iter_mut().zip(unshot).zip(self.emitted)
+        {
+            *residual = if emitted > 0.0 { unshot / emitted } else { 0.0 };
+        }
+    }
+}
+
+/// Values of all blocks, element by element and light by light.
+fn by_element(blocks: &[Vec<Lanes<LANES>>], lights: usize) -> Vec<Rgb> {
+    let elements = blocks.first().map_or(0, Vec::len);
+    let value = |element: usize, light: usize| {
+        let [r, g, b] = &blocks[light / LANES][element];
+        let lane = light % LANES;
+        Rgb::new(r[lane], g[lane], b[lane])
+    };
+    (0..elements)
+        .flat_map(|element| (0..lights).map(move |light| value(element, light)))
+        .collect()
+}
+
+fn total(value: Rgb) -> f32 {
+    value.to_array().iter().sum()
+}

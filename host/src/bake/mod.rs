@@ -1,0 +1,399 @@
+//! The bake: mesh, direct light, its bounces, contributions.
+//!
+//! Lamps and luminaires light the elements by rows of exact form factors ([`crate::rows`]). Then
+//! elements gather all bounces by rays ([`Method::Gather`]), or patches shoot them along further rows
+//! through the solver's own refinement ([`relume::refine`]), as a device does.
+
+mod bounce;
+mod direct;
+mod shoot;
+
+use std::ops::ControlFlow;
+
+use relume::color::Rgb;
+use relume::mesh::{Mesh, MeshError, Spacing};
+use relume::refine::RefineError;
+use relume::scene::{Scene, SceneError};
+use relume::visibility::Occluders;
+use thiserror::Error;
+
+use crate::bvh::Bvh;
+use crate::mesh::{self, BuildError, OwnedMesh};
+use crate::rows::{Parallel, Serial};
+use crate::scene::OwnedScene;
+use crate::solution::{Solution, SolutionLight};
+
+/// Lanes of a block of lights on the host.
+const LANES: usize = 8;
+
+/// Most bytes of state that a bake takes.
+const STATE_BYTES: usize = 6 << 30;
+
+/// How light gets from element to element.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Method {
+    /// Elements gather what rays bring them, by all threads; lamps shoot rows.
+    #[default]
+    Gather,
+    /// Patches shoot rows of exact form factors, filled by all threads.
+    Rows,
+    /// The solver alone, serially, by brute force: what a device does. Same bits as [`Self::Rows`].
+    Device,
+}
+
+impl Method {
+    /// The name on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Gather => "gather",
+            Self::Rows => "rows",
+            Self::Device => "device",
+        }
+    }
+}
+
+/// What to bake, how finely, and when to stop.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// Longest edge of a patch, in the scene's units; `None` for the rule of [`mesh::spacing`].
+    pub patch: Option<f32>,
+    /// Longest edge of an element.
+    pub element: Option<f32>,
+    /// Residual to reach, above zero.
+    pub residual: f32,
+    /// Stop after so many distinct rows and passes of rays, or so many shots of a plain refinement.
+    pub shots: Option<u32>,
+    /// As published: patches shoot, none is divided, no row is kept and no ambient term is added.
+    pub plain: bool,
+    /// Relative L1 error, of the worst light, that the rays may leave.
+    pub noise: f32,
+    /// Relative variation of direct light inside a patch above which it is divided to shoot.
+    pub variation: f64,
+    /// Keep direct and indirect light apart.
+    pub split_direct: bool,
+    /// How light gets from element to element.
+    pub method: Method,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            patch: None,
+            element: None,
+            residual: 1e-4,
+            shots: None,
+            plain: false,
+            noise: 0.005,
+            variation: 0.15,
+            split_direct: false,
+            method: Method::Gather,
+        }
+    }
+}
+
+/// How far a bake has come.
+#[derive(Clone, Copy, Debug)]
+pub enum Progress {
+    /// Looking for the faces that light reaches, then lighting them by luminaires: nothing to return
+    /// yet.
+    Meshing {
+        /// Parts of the scene that were looked at, or luminaires that were lit.
+        done: usize,
+        /// All of them.
+        parts: usize,
+    },
+    /// Evaluating rows: what is known so far makes a solution.
+    Shooting {
+        /// Rows evaluated, and passes of rays cast, so far.
+        rows: u32,
+        /// The most that there will be.
+        most: u32,
+        /// Largest residual over the lights.
+        residual: f32,
+    },
+}
+
+/// Why a bake cannot be done.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum BakeError {
+    /// A tag is out of range.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The scene cannot be divided so.
+    #[error("{0}; ask for longer patches and elements (--patch, --element)")]
+    Mesh(MeshError),
+    /// No surface reflects, so that nothing can be lit.
+    #[error("no surface reflects light: give a material a reflectance (Kd, base colour) above 0")]
+    NothingReflects,
+    /// No element receives light.
+    #[error(
+        "light reaches no surface: turn lamps so that their front (vertices counter-clockwise) faces \
+         the scene, and hang other lights in front of surfaces, not on them"
+    )]
+    NothingLit,
+    /// The watcher broke before there was anything to return.
+    #[error("interrupted before the first row")]
+    Interrupted,
+    /// The refinement refuses the input.
+    #[error(transparent)]
+    Refine(#[from] RefineError),
+    /// There is no light.
+    #[error("the scene has no light: give a material an emission (Ke), or add one with --lights")]
+    NoLight,
+    /// State and result would not fit into memory.
+    #[error(
+        "{elements} elements x {lights} lights need {gib:.1} GiB; ask for longer elements \
+         (--element) or fewer lights"
+    )]
+    Memory {
+        /// Elements of the mesh.
+        elements: usize,
+        /// Lights of the scene.
+        lights: usize,
+        /// What they would take.
+        gib: f64,
+    },
+}
+
+impl From<BuildError> for BakeError {
+    fn from(error: BuildError) -> Self {
+        match error {
+            BuildError::Mesh(error) => Self::Mesh(error),
+            BuildError::Interrupted => Self::Interrupted,
+        }
+    }
+}
+
+/// Bakes a scene. `watch` is called before every row; when it breaks, what is known so far is
+/// finished and returned, as `shots` would. It is called while the mesh is made as well, where
+/// there is nothing to return yet: [`BakeError::Interrupted`].
+///
+/// # Errors
+/// [`BakeError`] when the scene is not fit to be baked.
+pub fn bake(
+    scene: &OwnedScene,
+    settings: &Settings,
+    watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+) -> Result<Solution, BakeError> {
+    if scene.lights.is_empty() {
+        return Err(BakeError::NoLight);
+    }
+    let centred = mesh::centred(scene);
+    let view = centred.view()?;
+    if view.surfaces().iter().all(|s| s.reflectance().is_black()) {
+        return Err(BakeError::NothingReflects);
+    }
+    let spacing = mesh::spacing(&view, settings.patch, settings.element);
+    let bvh = Bvh::for_scene(&view);
+    let mesh = mesh::build(scene, &view, spacing, &bvh, &mut |done, parts| {
+        watch(Progress::Meshing { done, parts })
+    })?;
+    if mesh.elements.is_empty() {
+        return Err(BakeError::NothingLit);
+    }
+    check_memory(&mesh, scene.lights.len(), settings)?;
+
+    let mut job = Job {
+        scene: &view,
+        importances: scene.lights.iter().map(|light| light.importance).collect(),
+        settings,
+        watch,
+    };
+    let parallel = |mesh: &Mesh| Parallel::new(mesh, &bvh);
+    let serial = |_: &Mesh| Serial(Occluders(view.surfaces()));
+    let solved = match settings.method {
+        Method::Gather if !settings.plain => bounce::gather(&mut job, mesh, &bvh)?,
+        Method::Gather | Method::Rows => shoot::refine(&mut job, mesh, parallel)?,
+        Method::Device => shoot::refine(&mut job, mesh, serial)?,
+    };
+    Ok(solution(scene, spacing, solved))
+}
+
+/// What there is to do, and who watches.
+struct Job<'a> {
+    scene: &'a Scene<'a>,
+    importances: Vec<f32>,
+    settings: &'a Settings,
+    watch: &'a mut dyn FnMut(Progress) -> ControlFlow<()>,
+}
+
+impl Job<'_> {
+    fn lights(&self) -> usize {
+        self.scene.lights() as usize
+    }
+
+    /// True when the shots are used up, or the watcher wants no more.
+    fn ends(&mut self, rows: u32, most: u32, residual: f32) -> bool {
+        let progress = Progress::Shooting {
+            rows,
+            most,
+            residual,
+        };
+        self.settings.shots.is_some_and(|limit| rows >= limit) || (self.watch)(progress).is_break()
+    }
+}
+
+/// What a bake leaves behind, element by element and light by light.
+struct Solved {
+    mesh: OwnedMesh,
+    contributions: Vec<Rgb>,
+    direct: Option<Vec<Rgb>>,
+    /// One for each light.
+    residuals: Vec<f32>,
+    rows: u32,
+}
+
+/// Lanes of the refinement and values of the solution both take 12 bytes an element and light.
+fn check_memory(mesh: &OwnedMesh, lights: usize, settings: &Settings) -> Result<(), BakeError> {
+    let (n, p) = (mesh.elements.len(), mesh.patches.len());
+    let copies = if settings.split_direct { 2 } else { 1 };
+    let bytes = (copies * 2 * n + p) as f64 * (lights.div_ceil(LANES) * LANES * 12) as f64;
+    if bytes > STATE_BYTES as f64 {
+        return Err(BakeError::Memory {
+            elements: n,
+            lights,
+            gib: bytes / f64::from(1 << 30),
+        });
+    }
+    Ok(())
+}
+
+fn solution(scene: &OwnedScene, spacing: Spacing, solved: Solved) -> Solution {
+    let lights = scene.lights.iter().zip(solved.residuals);
+    Solution {
+        surfaces: scene.surfaces.iter().map(|s| *s.polygon()).collect(),
+        mesh: mesh::returned(&solved.mesh, scene),
+        lights: lights
+            .map(|(light, residual)| SolutionLight {
+                name: light.name.clone(),
+                emission: light.emission,
+                residual,
+            })
+            .collect(),
+        contributions: solved.contributions,
+        direct: solved.direct,
+        rows: solved.rows,
+        spacing,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Light;
+    use glam::Vec3;
+    use relume::scene::{Emission, Luminaire, Source, Surface};
+
+    /// A room from -2 to 2 with a closed box on its floor, a lamp and a point light; `at` is its
+    /// middle, and every coordinate a multiple of 1/64.
+    fn room(at: Vec3) -> OwnedScene {
+        let closed = |middle: Vec3, half: f32| {
+            [Vec3::X, Vec3::Y, Vec3::Z]
+                .into_iter()
+                .flat_map(|axis| [axis, -axis])
+                .map(move |out| {
+                    let (u, v) = out.any_orthonormal_pair();
+                    let corners = [out - u - v, out - u + v, out + u + v, out + u - v];
+                    corners.map(|corner| at + middle + corner * half)
+                })
+        };
+        let walls = closed(Vec3::ZERO, 2.0).chain(closed(Vec3::new(0.5, -1.5, 0.25), 0.5));
+        let mut surfaces: Vec<Surface> = walls
+            .zip(0..)
+            .map(|(wall, index)| Surface::new(index, &wall, Rgb::splat(0.5)).unwrap())
+            .map(Surface::two_sided)
+            .collect();
+        let lamp = [(-1.0, -1.0), (-0.5, -1.0), (-0.5, -0.5), (-1.0, -0.5)];
+        let lamp = lamp.map(|(x, z)| at + Vec3::new(x, 1.875, z));
+        let emission = Emission {
+            light: 0,
+            share: Rgb::WHITE,
+        };
+        let lamp = Surface::new(12, &lamp, Rgb::BLACK).unwrap();
+        surfaces.push(lamp.emitting(12, emission).unwrap());
+        let position = at + Vec3::new(0.5, 0.75, 0.5);
+        let light = |name: &str| Light {
+            name: name.to_owned(),
+            emission: Rgb::WHITE,
+            importance: 1.0,
+        };
+        OwnedScene {
+            textures: vec![None; surfaces.len()],
+            surfaces,
+            luminaires: vec![Luminaire::new(1, Rgb::WHITE, Source::Point { position }).unwrap()],
+            lights: vec![light("lamp"), light("bulb")],
+        }
+    }
+
+    const COARSE: Settings = Settings {
+        patch: Some(1.0),
+        element: Some(0.5),
+        residual: 1e-4,
+        shots: None,
+        plain: false,
+        noise: 0.1,
+        variation: 0.15,
+        split_direct: false,
+        method: Method::Gather,
+    };
+
+    #[test]
+    fn a_scene_far_from_the_origin_has_the_faces_and_the_light_of_one_at_home() {
+        let bake =
+            |scene: &OwnedScene| bake(scene, &COARSE, &mut |_| ControlFlow::Continue(())).unwrap();
+        let home = bake(&room(Vec3::ZERO));
+        // One side of each wall; one of each of the box's, and none of that on the floor; the lamp.
+        assert_eq!(home.mesh.faces.len(), 6 + 5 + 1);
+        for far in [10.0, 100.0, 1e3, 1e4, 1e5] {
+            for at in [Vec3::splat(far), Vec3::new(0.0, -far, 0.0)] {
+                let scene = room(at);
+                let away = bake(&scene);
+                assert!(away.contributions == home.contributions, "{at}");
+                assert_eq!(away.mesh.elements, home.mesh.elements, "{at}");
+                for face in &away.mesh.faces {
+                    let own = *scene.surfaces[face.surface as usize].polygon();
+                    let outlines = [own, own.flipped()];
+                    assert!(outlines.contains(&face.polygon), "{at}: {face:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn who_breaks_off_gets_nothing_before_the_first_row_and_what_is_known_after_it() {
+        let scene = room(Vec3::ZERO);
+        let is_row = |progress: &Progress| matches!(progress, Progress::Shooting { .. });
+        // How often the watcher is asked before the first row.
+        let mut early = 0;
+        let whole = bake(&scene, &COARSE, &mut |progress| {
+            early += usize::from(!is_row(&progress));
+            ControlFlow::Continue(())
+        });
+        assert!(early >= 2, "parts of the scene, and a luminaire: {early}");
+        for patience in 0..early + 10 {
+            let mut asked = 0;
+            let part = bake(&scene, &COARSE, &mut |_| {
+                asked += 1;
+                if asked > patience {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
+            });
+            if patience < early {
+                assert!(matches!(part, Err(BakeError::Interrupted)), "{patience}");
+                assert_eq!(asked, patience + 1, "it went on");
+                continue;
+            }
+            let part = part.unwrap();
+            let told = Settings {
+                shots: Some(part.rows),
+                ..COARSE
+            };
+            let told = bake(&scene, &told, &mut |_| ControlFlow::Continue(()));
+            assert!(part == told.unwrap() && part != *whole.as_ref().unwrap());
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! Bounces that patches shoot along rows of form factors, through the solver's refinement.
+
+use relume::color::Rgb;
+use relume::mesh::Mesh;
+use relume::refine::{Block, Choice, PatchState, Refinement, RowStorage, Storage};
+
+use super::direct::{self, lamp_count};
+use super::{BakeError, Job, LANES, Settings, Solved};
+use crate::mesh::{Direct, OwnedMesh, Split, split};
+use crate::rows::RowFiller;
+
+/// Most bytes of kept rows.
+const ROW_BYTES: usize = 4 << 30;
+
+/// Most bytes of lamps' rows that are held until the patches are divided.
+const LAMP_BYTES: usize = 1 << 30;
+
+/// Most shooters that patches are divided into, for each of them.
+const SHOOTERS_PER_PATCH: usize = 3;
+
+/// A row of direct light that waits to be shot.
+struct Held {
+    light: u32,
+    share: Rgb,
+    patch: Option<u32>,
+    row: Vec<f32>,
+}
+
+/// Direct light, shooters where it varies, then rows until the residual is reached or the job ends.
+pub(super) fn refine<F: RowFiller>(
+    job: &mut Job,
+    mut mesh: OwnedMesh,
+    filler: impl Fn(&Mesh) -> F,
+) -> Result<Solved, BakeError> {
+    let settings = job.settings;
+    let lights = job.lights();
+    // As published, and where the rows of the lamps are too many to be held, lamps are shot like
+    // any other patch.
+    let bytes = lamp_count(&mesh) as usize * mesh.elements.len() * 4;
+    let lamps_first = !settings.plain && bytes <= LAMP_BYTES;
+    let mut held = Vec::new();
+    let mut irradiance = vec![0.0; mesh.elements.len() * lights];
+    let most = (mesh.patches.len() * SHOOTERS_PER_PATCH) as u32;
+    let direct_filler = filler(&mesh.view());
+    let lamps = direct::visit(job, &mesh, &direct_filler, most, lamps_first, |direct| {
+        add_direct(&mut irradiance, lights, &direct);
+        held.push(Held {
+            light: direct.light,
+            share: direct.share,
+            patch: direct.patch,
+            row: direct.row.to_vec(),
+        });
+        Ok(())
+    })?;
+    let mut first: Vec<u32> = (0..mesh.patches.len() as u32).collect();
+    if lamps_first && lamps.are_complete {
+        let irradiance = irradiance.as_slice();
+        let direct = Direct { irradiance, lights };
+        let budget = SHOOTERS_PER_PATCH * mesh.patches.len();
+        Split { mesh, first, .. } = split(&mesh, direct, settings.variation, budget);
+    }
+
+    let mut memory = Memory::new(&mesh, lights, settings);
+    let storage = memory.storage();
+    let goal = settings.residual;
+    let tags = job.scene.lights();
+    let mut refinement = Refinement::<LANES>::new(mesh.view(), tags, goal, storage)?;
+    if settings.plain {
+        refinement.set_choice(Choice::Power);
+    }
+    for (importance, tag) in job.importances.iter().zip(0..) {
+        refinement.set_importance(tag, *importance)?;
+    }
+    for Held {
+        light,
+        share,
+        patch,
+        row,
+    } in held
+    {
+        match patch {
+            None => refinement.illuminate(light, share, &row)?,
+            Some(patch) => refinement.shoot(first[patch as usize], &row)?,
+        }
+    }
+    let filler = filler(&mesh.view());
+    let mut row = vec![0.0; mesh.elements.len()];
+    let most = mesh.patches.len() as u32;
+    while let Some(patch) = refinement.next_shooter() {
+        if job.ends(refinement.rows_evaluated(), most, refinement.residual()) {
+            break;
+        }
+        filler.patch(&mesh.view(), patch, &mut row);
+        refinement.shoot(patch, &row)?;
+    }
+    refinement.finish();
+    Ok(read_out(&mesh, lights as u32, settings, &refinement))
+}
+
+/// Adds the sum over the channels of a row of direct light.
+fn add_direct(irradiance: &mut [f32], lights: usize, direct: &direct::DirectRow) {
+    let share: f32 = direct.share.to_array().iter().sum();
+    let values = irradiance.iter_mut().skip(direct.light as usize);
+    for (value, factor) in values.step_by(lights).zip(direct.row) {
+        *value += share * factor;
+    }
+}
+
+/// The memory that a refinement borrows.
+struct Memory {
+    irradiance: Vec<[[f32; LANES]; 3]>,
+    direct: Vec<[[f32; LANES]; 3]>,
+    unshot: Vec<[[f32; LANES]; 3]>,
+    patches: Vec<PatchState>,
+    blocks: Vec<Block<LANES>>,
+    factors: Vec<f32>,
+    shares: Vec<Rgb>,
+    sources: Vec<[[f32; LANES]; 3]>,
+    sent: Vec<[[f32; LANES]; 3]>,
+    work: Vec<[[f32; LANES]; 3]>,
+}
+
+impl Memory {
+    fn new(mesh: &OwnedMesh, lights: usize, settings: &Settings) -> Self {
+        let blocks = lights.div_ceil(LANES);
+        let (n, p) = (mesh.elements.len(), mesh.patches.len());
+        let zero = [[0.0; LANES]; 3];
+        let rows = if settings.plain {
+            0
+        } else {
+            p.min(ROW_BYTES / (4 * n + 12 * p).max(1))
+        };
+        let known = if rows > 0 { p } else { 0 };
+        Self {
+            irradiance: vec![zero; n * blocks],
+            direct: vec![zero; if settings.split_direct { n * blocks } else { 0 }],
+            unshot: vec![zero; p * blocks],
+            patches: vec![PatchState::EMPTY; p],
+            blocks: vec![Block::EMPTY; blocks],
+            factors: vec![0.0; rows * n],
+            shares: vec![Rgb::BLACK; rows * p],
+            sources: vec![zero; known * blocks],
+            sent: vec![zero; known * blocks],
+            work: vec![zero; 6 * known],
+        }
+    }
+
+    fn storage(&mut self) -> Storage<'_, LANES> {
+        Storage {
+            irradiance: &mut self.irradiance,
+            direct: &mut self.direct,
+            unshot: &mut self.unshot,
+            patches: &mut self.patches,
+            blocks: &mut self.blocks,
+            rows: RowStorage {
+                factors: &mut self.factors,
+                shares: &mut self.shares,
+                sources: &mut self.sources,
+                sent: &mut self.sent,
+                work: &mut self.work,
+            },
+        }
+    }
+}
+
+/// Reads the contributions out of the refinement; what is still unshot enters as ambient light.
+fn read_out(
+    mesh: &OwnedMesh,
+    lights: u32,
+    settings: &Settings,
+    refinement: &Refinement<LANES>,
+) -> Solved {
+    let elements = mesh.elements.len() as u32;
+    // What is left of a light that has shot its share and met nothing will meet nothing either.
+    let is_lost = |light: u32| {
+        let meets = |element| refinement.irradiance(element, light) != Rgb::BLACK;
+        refinement.light_residual(light) <= settings.residual && !(0..elements).any(meets)
+    };
+    let ambient: Vec<Rgb> = (0..lights)
+        .map(|light| {
+            if settings.plain || is_lost(light) {
+                Rgb::BLACK
+            } else {
+                refinement.ambient(light)
+            }
+        })
+        .collect();
+    let collect = |value: &dyn Fn(u32, u32) -> Rgb| -> Vec<Rgb> {
+        (0..elements)
+            .flat_map(|element| (0..lights).map(move |light| (element, light)))
+            .map(|(element, light)| value(element, light))
+            .collect()
+    };
+    Solved {
+        contributions: collect(&|element, light| {
+            refinement.irradiance(element, light) + ambient[light as usize]
+        }),
+        direct: settings
+            .split_direct
+            .then(|| collect(&|element, light| refinement.direct(element, light))),
+        residuals: (0..lights).map(|l| refinement.light_residual(l)).collect(),
+        rows: refinement.rows_evaluated(),
+        mesh: mesh.clone(),
+    }
+}
