@@ -748,7 +748,8 @@ fn what_cannot_be_done_with_a_file_is_one_line_and_exit_1() {
     folder.done("pack room.solution --no-mesh -o bare.atlas");
     folder.write("bad.csv", "x,y,z\n1,2,3\n");
     folder.write("zero.csv", "x,y,z,nx,ny,nz\n1,2,3,0,0,0\n");
-    folder.write("words.csv", "x,y,z,nx,ny,nz\n1,2,3,0,1,up\n");
+    folder.write("words.csv", "x,y,z,nx,ny,nz\n\n\n1,2,3,0,1,up\n");
+    folder.write("void.csv", "");
     folder.write("bad.toml", "eye = 1\n");
     for (command, expected) in [
         ("pack none.solution", "none.solution: cannot be read"),
@@ -787,9 +788,13 @@ fn what_cannot_be_done_with_a_file_is_one_line_and_exit_1() {
             "probe room.atlas --points none.csv",
             "none.csv: cannot be read",
         ),
-        ("probe room.atlas --points bad.csv", "x,y,z,nx,ny,nz"),
+        (
+            "probe room.atlas --points bad.csv",
+            "bad.csv: line 1: the header is missing",
+        ),
+        ("probe room.atlas --points void.csv", "void.csv: line 1"),
         ("probe room.atlas --points zero.csv", "zero.csv: line 2"),
-        ("probe room.atlas --points words.csv", "line: 2"),
+        ("probe room.atlas --points words.csv", "words.csv: line 4"),
         ("info none.atlas", "none.atlas: cannot be read"),
         ("info room.mtl", "room.mtl: neither a solution nor"),
     ] {
