@@ -306,7 +306,16 @@ fn an_atlas_is_what_was_asked_for() {
         assert_eq!(report["code"], code);
         let error = report["max_error_codes"].as_f64().unwrap();
         assert!(error > 0.0 && error < 255.0, "{report}");
-        folder.json("info a")
+        let info = folder.json("info a");
+        // The atlas states what packing said, and every light alone is one of the states.
+        for key in ["max_error_codes", "codes_shown"] {
+            assert_eq!(info[key], report[key], "{key}");
+        }
+        for light in info["per_light"].as_array().unwrap() {
+            let alone = light["max_error_codes"].as_f64().unwrap();
+            assert!(alone > 0.0 && alone <= error, "{light}");
+        }
+        info
     };
     let own = packed("", "exp8s");
     assert!(folder.read("a") == folder.read("room.atlas"));
