@@ -2,8 +2,8 @@
 //!
 //! A point belongs to the nearest surface within 1e-3 of the diagonal of the scene's bounding box
 //! whose normal, of either side, agrees within 10 degrees; it gets the value of the element that
-//! holds it. A side that no light reaches has no elements and gets 0; a side of reflectance 0 is
-//! not stored and gives no value.
+//! holds it. A side that no light reaches has no elements and gets 0, and so does the back of a
+//! one-sided surface, which reflects nothing; a side of reflectance 0 is not stored and gives no value.
 
 use std::collections::HashMap;
 use std::io;

@@ -6,6 +6,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use glam::Vec3;
 use relume::color::Rgb;
+use relume::geometry::Polygon;
 use serde_json::json;
 
 use super::load::{Loaded, load};
@@ -55,7 +56,7 @@ struct CameraArguments {
     /// What it looks at
     #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
     target: Option<Vec3>,
-    /// What is up
+    /// What is up, also for what the program chooses [default: 0,1,0]
     #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
     up: Option<Vec3>,
     /// Vertical field of view in radians
@@ -82,7 +83,14 @@ impl CameraArguments {
         if let Some(file) = &self.camera {
             return Ok(Viewpoint::from_toml_file(file)?);
         }
-        let chosen = Viewpoint::fit(&loaded.solution().surfaces, aspect);
+        let solution = loaded.solution();
+        let faces = solution.mesh.faces.iter();
+        let lit = faces.filter(|face| face.element_count > 0);
+        let lit: Vec<Polygon> = lit.map(|face| face.polygon).collect();
+        let surfaces = &solution.surfaces;
+        let shown = if lit.is_empty() { surfaces } else { &lit };
+        let up = self.up.unwrap_or(Vec3::Y);
+        let chosen = Viewpoint::fit(shown, surfaces, up, aspect);
         let chosen = chosen.context("the scene has no surfaces to look at")?;
         Ok(Viewpoint {
             eye: self.eye.unwrap_or(chosen.eye),
