@@ -121,6 +121,7 @@ fn atlas_bytes(elements: u32, lights: u32, channels: Channels) -> Vec<u8> {
         quantity: Quantity::Irradiance,
         lights: &vec![entry; lights as usize],
         elements,
+        errors: None,
         mesh: None,
     };
     let contribution = |element: u32, light: u32| {

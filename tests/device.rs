@@ -89,6 +89,7 @@ fn bake_and_pack(flash: &mut [u8]) -> usize {
         quantity: Quantity::Irradiance,
         lights: &lights,
         elements: ELEMENTS as u32,
+        errors: None,
         mesh: Some((&outlines, mesh)),
     };
     atlas::write(&contents, |e, l| refinement.irradiance(e, l), flash).expect("it fits")

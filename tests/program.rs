@@ -306,7 +306,16 @@ fn an_atlas_is_what_was_asked_for() {
         assert_eq!(report["code"], code);
         let error = report["max_error_codes"].as_f64().unwrap();
         assert!(error > 0.0 && error < 255.0, "{report}");
-        folder.json("info a")
+        let info = folder.json("info a");
+        // The atlas states what packing said, and every light alone is one of the states.
+        for key in ["max_error_codes", "codes_shown"] {
+            assert_eq!(info[key], report[key], "{key}");
+        }
+        for light in info["per_light"].as_array().unwrap() {
+            let alone = light["max_error_codes"].as_f64().unwrap();
+            assert!(alone > 0.0 && alone <= error, "{light}");
+        }
+        info
     };
     let own = packed("", "exp8s");
     assert!(folder.read("a") == folder.read("room.atlas"));
@@ -827,6 +836,7 @@ fn wrong_scenes_are_one_line_and_exit_1() {
     };
     folder.write("room.txt", &obj);
     folder.write("nan.obj", obj.replacen("v 4 0 3", "v 4 NaN 3", 1));
+    folder.write("huge.obj", obj.replacen("v 4 0", "v 4e10 0", 1));
     folder.write("index.obj", obj.clone() + "f 1 2 999\n");
     folder.write("empty.obj", "");
     folder.write("latin.obj", b"v 0 0 0\n# caf\xe9\n");
@@ -848,6 +858,7 @@ fn wrong_scenes_are_one_line_and_exit_1() {
         ("index.obj", "999"),
         ("empty.obj", "empty.obj: no usable face"),
         ("latin.obj", "latin.obj, line 2: not UTF-8"),
+        ("huge.obj", "huge.obj: vertex (4e10, 0e0, "),
         ("dark.obj", "dark.obj: the scene has no light"),
         ("minus.obj", "minus.mtl, material \"white\""),
         ("cut.glb", "cut.glb"),
@@ -896,8 +907,10 @@ fn what_cannot_be_done_with_a_file_is_one_line_and_exit_1() {
     folder.done("pack room.solution --no-mesh -o bare.atlas");
     folder.write("bad.csv", "x,y,z\n1,2,3\n");
     folder.write("zero.csv", "x,y,z,nx,ny,nz\n1,2,3,0,0,0\n");
-    folder.write("words.csv", "x,y,z,nx,ny,nz\n1,2,3,0,1,up\n");
+    folder.write("words.csv", "x,y,z,nx,ny,nz\n\n\n1,2,3,0,1,up\n");
+    folder.write("void.csv", "");
     folder.write("bad.toml", "eye = 1\n");
+    folder.write("flat.toml", CAMERA.replace("fov = 1", "fov = 9"));
     for (command, expected) in [
         ("pack none.solution", "none.solution: cannot be read"),
         ("pack room.atlas -o b", "room.atlas: this is an atlas"),
@@ -919,6 +932,16 @@ fn what_cannot_be_done_with_a_file_is_one_line_and_exit_1() {
         ),
         ("relight room.atlas --camera none.toml", "none.toml"),
         ("relight room.atlas --camera bad.toml", "bad.toml"),
+        (
+            "relight room.atlas --camera flat.toml",
+            "flat.toml: the field of view 9 is outside",
+        ),
+        (
+            "relight room.atlas --fov -1",
+            "field of view -1 is outside (0, pi) radians",
+        ),
+        ("relight room.atlas --set \u{1b}=1", "`\\u{1b}`"),
+        ("info es\u{1b}cape", "es\\u{1b}cape: cannot be read"),
         ("relight room.atlas --size 0x10", "0 x 10"),
         ("relight room.atlas --size 20000x10", "16384"),
         ("relight room.atlas --fov 4", "field of view 4"),
@@ -935,9 +958,13 @@ fn what_cannot_be_done_with_a_file_is_one_line_and_exit_1() {
             "probe room.atlas --points none.csv",
             "none.csv: cannot be read",
         ),
-        ("probe room.atlas --points bad.csv", "x,y,z,nx,ny,nz"),
+        (
+            "probe room.atlas --points bad.csv",
+            "bad.csv: line 1: the header is missing",
+        ),
+        ("probe room.atlas --points void.csv", "void.csv: line 1"),
         ("probe room.atlas --points zero.csv", "zero.csv: line 2"),
-        ("probe room.atlas --points words.csv", "line: 2"),
+        ("probe room.atlas --points words.csv", "words.csv: line 4"),
         ("info none.atlas", "none.atlas: cannot be read"),
         ("info room.mtl", "room.mtl: neither a solution nor"),
     ] {
@@ -950,6 +977,43 @@ fn what_cannot_be_done_with_a_file_is_one_line_and_exit_1() {
     // What an atlas without a mesh is good for.
     assert_eq!(elements(&folder, "bare.atlas", "").len(), 2 * 1016);
     folder.json("info bare.atlas");
+}
+
+#[test]
+fn an_input_is_never_overwritten() {
+    let folder = with_room();
+    folder.write("view.toml", CAMERA);
+    fs::create_dir(folder.path().join("sub")).unwrap();
+    #[cfg(unix)]
+    std::os::unix::fs::symlink("room.solution", folder.path().join("link")).unwrap();
+    for command in [
+        "bake room.obj -o room.obj",
+        "bake room.obj -o sub/../room.obj",
+        "pack room.solution -o room.solution",
+        "pack room.solution -o ./room.solution",
+        "relight room.atlas -o room.atlas",
+        "relight room.atlas --camera view.toml -o view.toml",
+        "probe room.atlas --elements -o room.atlas",
+        "probe room.atlas --points points.csv -o points.csv",
+        #[cfg(unix)]
+        "pack room.solution -o link",
+    ] {
+        let line = folder.refused(command);
+        assert!(line.contains("is an input"), "{command}: {line}");
+    }
+}
+
+#[test]
+fn names_of_lights_may_begin_with_a_dash() {
+    let folder = with_scene();
+    folder.write("room.mtl", room::mtl().replace("sconce", "-dash"));
+    folder.write("room.obj", room::obj(false).replace("sconce", "-dash"));
+    folder.done("bake room.obj --element 1");
+    for option in ["--set", "--only"] {
+        let command = format!("relight room.solution --size 4x3 {option} -dash=1,0,0");
+        let mix = &folder.json(&command)["mix"];
+        assert_eq!(mix[1], json!({"name": "-dash", "weight": [1.0, 0.0, 0.0]}));
+    }
 }
 
 #[test]

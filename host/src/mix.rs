@@ -110,7 +110,7 @@ const LARGEST_WEIGHT: f32 = 1e20;
 #[non_exhaustive]
 pub enum MixError {
     /// A setting names a light that is not there.
-    #[error("there is no light `{name}`; the lights are: {known}")]
+    #[error("there is no light `{}`; the lights are: {known}", .name.escape_debug())]
     UnknownLight {
         /// The name that was given.
         name: String,
@@ -118,7 +118,7 @@ pub enum MixError {
         known: String,
     },
     /// A light would be brighter than numbers can tell.
-    #[error("light `{0}`: a weight above 1e20 is more than can be shown; set it lower")]
+    #[error("light `{}`: a weight above 1e20 is more than can be shown; set it lower", .0.escape_debug())]
     TooBright(String),
 }
 
@@ -158,7 +158,8 @@ pub fn mix(
 /// The first names, and how many more there are.
 fn listed(lights: &[SolutionLight]) -> String {
     const SHOWN: usize = 12;
-    let names: Vec<&str> = lights.iter().map(|l| l.name.as_str()).take(SHOWN).collect();
+    let names = lights.iter().take(SHOWN);
+    let names: Vec<String> = names.map(|l| l.name.escape_debug().to_string()).collect();
     let names = names.join(", ");
     match lights.len().checked_sub(SHOWN) {
         None | Some(0) => names,
@@ -212,6 +213,12 @@ mod tests {
         assert_eq!(
             error.to_string(),
             "there is no light `d`; the lights are: a, b=c"
+        );
+        let error = mix(&lights(), &[], &[setting("\n\u{1b}[31m=1")]).unwrap_err();
+        assert!(
+            error
+                .to_string()
+                .starts_with("there is no light `\\n\\u{1b}[31m`;")
         );
     }
 }

@@ -1,6 +1,8 @@
 //! From a solution to an atlas and back, and what the packing costs.
 
-use relume::atlas::{self, Atlas, AtlasError, Channels, Contents, LightEntry, Quantity};
+use relume::atlas::{
+    self, Atlas, AtlasError, Channels, Contents, LightEntry, Quantity, WorstError,
+};
 use relume::code::{Code, DecodeTable, Scale};
 use relume::color::Rgb;
 use relume::geometry::Polygon;
@@ -34,15 +36,42 @@ pub enum PackError {
     #[error(transparent)]
     Atlas(#[from] AtlasError),
     /// A contribution or emission of this light cannot be scaled.
-    #[error("light `{0}`: its values leave the range that can be packed")]
+    #[error("light {0:?}: its values leave the range that can be packed; change its emission")]
     Scale(String),
+    /// A state of the lights cannot be relit.
+    #[error(transparent)]
+    Relight(#[from] RelightError),
 }
 
-/// Packs a solution.
+/// Packs a solution; the atlas states what that cost.
 ///
 /// # Errors
 /// [`PackError`] when counts or values leave the format's range.
 pub fn pack(solution: &Solution, format: Format) -> Result<Vec<u8>, PackError> {
+    let (bytes, _) = pack_measured(solution, format)?;
+    Ok(bytes)
+}
+
+/// The same, with all that was measured.
+///
+/// # Errors
+/// [`PackError`] when counts or values leave the format's range.
+pub fn pack_measured(
+    solution: &Solution,
+    format: Format,
+) -> Result<(Vec<u8>, PackingError), PackError> {
+    let bare = write(solution, format, None)?;
+    let error = packing_error(solution, &Atlas::parse(&bare)?)?;
+    let bytes = write(solution, format, Some(&error))?;
+    Ok((bytes, error))
+}
+
+/// The bytes of an atlas, with its errors once they are known.
+fn write(
+    solution: &Solution,
+    format: Format,
+    error: Option<&PackingError>,
+) -> Result<Vec<u8>, PackError> {
     let values = packed_values(solution, format.quantity);
     let scales = match format.code {
         Code::Exp8 => common_scales(solution, &values),
@@ -66,6 +95,7 @@ pub fn pack(solution: &Solution, format: Format) -> Result<Vec<u8>, PackError> {
         quantity: format.quantity,
         lights: &entries,
         elements: solution.mesh.elements.len() as u32,
+        errors: error.map(|error| (error.worst(), &error.per_light[..])),
         mesh: format
             .mesh
             .then(|| (&solution.surfaces[..], solution.mesh.view())),
@@ -232,6 +262,16 @@ pub struct PackingError {
     pub codes_shown: f32,
     /// Largest with each light alone, in their order.
     pub per_light: Vec<f32>,
+}
+
+impl PackingError {
+    /// What the atlas states of it.
+    const fn worst(&self) -> WorstError {
+        WorstError {
+            packed: self.codes,
+            shown: self.codes_shown,
+        }
+    }
 }
 
 /// Compares an atlas with the solution that it was packed from, over the mixes of [`test_mixes`].

@@ -2,17 +2,16 @@
 //!
 //! A point belongs to the nearest surface within 1e-3 of the diagonal of the scene's bounding box
 //! whose normal, of either side, agrees within 10 degrees; it gets the value of the element that
-//! holds it. A side that no light reaches has no elements and gets 0; a side of reflectance 0 is
-//! not stored and gives no value.
+//! holds it. A side that no light reaches has no elements and gets 0, and so does the back of a
+//! one-sided surface, which reflects nothing; a side of reflectance 0 is not stored and gives no value.
 
 use std::collections::HashMap;
 use std::io;
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use relume::color::Rgb;
 use relume::geometry::Polygon;
 use relume::mesh::{Element, Face, Side};
-use serde::Deserialize;
 use thiserror::Error;
 
 use crate::solution::Solution;
@@ -24,29 +23,23 @@ const REACH: f32 = 1e-3;
 const LEAST_COSINE: f32 = 0.984_807_8;
 
 /// A surface point to be probed.
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug)]
 pub struct ProbePoint {
-    x: f32,
-    y: f32,
-    z: f32,
-    nx: f32,
-    ny: f32,
-    nz: f32,
+    position: Vec3,
+    normal: Vec3,
 }
 
 /// Why points or values cannot be read or written.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ProbeError {
-    /// A row is no point.
-    #[error("{0}; the header must be x,y,z,nx,ny,nz and every value a number")]
-    Points(#[from] csv::Error),
-    /// A value is NaN or infinite, or the normal is zero.
-    #[error("line {line}: a value is not finite, or the normal is zero")]
-    Illegal {
+    /// A line of the points is no header or no point.
+    #[error("line {line}: {fault}")]
+    Points {
         /// Line of the file, from 1.
         line: u64,
+        /// What is wrong, and what to do.
+        fault: String,
     },
     /// There is no place to look for points.
     #[error(
@@ -58,41 +51,85 @@ pub enum ProbeError {
     NoDirect,
     /// Writing failed.
     #[error(transparent)]
+    Write(#[from] csv::Error),
+    /// Writing failed at the end.
+    #[error(transparent)]
     Io(#[from] io::Error),
 }
+
+/// The columns of a points file; they may stand in any order.
+const COLUMNS: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
 
 /// Reads points from CSV with the header `x,y,z,nx,ny,nz`.
 ///
 /// # Errors
-/// [`ProbeError`] that names the line.
+/// [`ProbeError::Points`] with the first line that is wrong.
 pub fn read_points(text: &[u8]) -> Result<Vec<ProbePoint>, ProbeError> {
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .from_reader(text);
+    let text = std::str::from_utf8(text).map_err(|error| {
+        let before = text.iter().take(error.valid_up_to());
+        let line = 1 + before.filter(|byte| **byte == b'\n').count() as u64;
+        let fault = "not UTF-8 text; save the file as UTF-8".to_owned();
+        ProbeError::Points { line, fault }
+    })?;
+    let mut columns = None;
     let mut points = Vec::new();
-    for (row, line) in reader.deserialize::<ProbePoint>().zip(2..) {
-        let point = row?;
-        let normal = point.normal();
-        if !(point.position().is_finite() && normal.is_finite() && normal.length() > 0.0) {
-            return Err(ProbeError::Illegal { line });
+    for (row, line) in text.trim_start_matches('\u{feff}').lines().zip(1..) {
+        if row.trim().is_empty() {
+            continue;
         }
-        points.push(point);
+        let fault = |fault: String| ProbeError::Points { line, fault };
+        let cells: Vec<&str> = row.split(',').map(bare).collect();
+        match columns {
+            None => columns = Some(header(&cells).map_err(fault)?),
+            Some(columns) => points.push(point(&cells, columns).map_err(fault)?),
+        }
     }
-    Ok(points)
+    match columns {
+        Some(_) => Ok(points),
+        None => Err(ProbeError::Points {
+            line: 1,
+            fault: header(&[]).err().unwrap_or_default(),
+        }),
+    }
 }
 
-impl ProbePoint {
-    /// Where it is.
-    #[must_use]
-    pub const fn position(&self) -> Vec3 {
-        Vec3::new(self.x, self.y, self.z)
+/// A cell without the blanks and quotes around it.
+fn bare(cell: &str) -> &str {
+    let cell = cell.trim();
+    let quoted = cell.strip_prefix('"').and_then(|c| c.strip_suffix('"'));
+    quoted.unwrap_or(cell)
+}
+/// Where each of [`COLUMNS`] stands.
+fn header(cells: &[&str]) -> Result<[usize; 6], String> {
+    let places = COLUMNS.map(|name| cells.iter().position(|cell| *cell == name));
+    match places {
+        [Some(x), Some(y), Some(z), Some(nx), Some(ny), Some(nz)] if cells.len() == 6 => {
+            Ok([x, y, z, nx, ny, nz])
+        }
+        _ => Err("the header is missing; begin the file with a line x,y,z,nx,ny,nz".to_owned()),
     }
+}
 
-    /// Where it faces; any length above zero.
-    #[must_use]
-    pub const fn normal(&self) -> Vec3 {
-        Vec3::new(self.nx, self.ny, self.nz)
+fn point(cells: &[&str], columns: [usize; 6]) -> Result<ProbePoint, String> {
+    if cells.len() != columns.len() {
+        let count = cells.len();
+        return Err(format!("{count} values; give six, x,y,z,nx,ny,nz"));
     }
+    let mut values = [0.0; 6];
+    for (value, column) in values.iter_mut().zip(columns) {
+        let cell = cells[column];
+        let number = cell.parse().ok().filter(|number: &f32| number.is_finite());
+        *value = number.ok_or_else(|| format!("{cell:?} is not a finite number; correct it"))?;
+    }
+    let [x, y, z, nx, ny, nz] = values;
+    // In f64, where the square of no f32 vanishes or overflows.
+    let normal = DVec3::new(nx.into(), ny.into(), nz.into()).try_normalize();
+    Ok(ProbePoint {
+        position: Vec3::new(x, y, z),
+        normal: normal
+            .ok_or("the normal is zero; give the direction that the surface faces")?
+            .as_vec3(),
+    })
 }
 
 /// Which values to give.
@@ -130,7 +167,7 @@ pub fn probe_points(
     let mut table = Table::new("point")?;
     let mut missing = 0;
     for (point, number) in points.iter().zip(0..) {
-        let place = places.find(point.position(), point.normal().normalize());
+        let place = places.find(point.position, point.normal);
         missing += usize::from(place == Place::None);
         for (light, tag) in solution.lights.iter().zip(0..) {
             let value = match place {
@@ -374,15 +411,47 @@ mod tests {
     }
 
     #[test]
-    fn bad_points_name_their_line() {
-        for (text, line) in [
-            ("x,y,z,nx,ny,nz\n0,0,0,0,0,0\n", "line 2"),
-            ("x,y,z,nx,ny,nz\n0,0,0,0,1,0\n0,0,0,0,nan,0\n", "line 3"),
-            ("x,y,z,nx,ny,nz\n0,0,0,0,1,0\n0,0\n", "line: 3"),
-            ("a,b\n1,2\n", "x"),
+    fn bad_points_name_their_line_and_the_remedy() {
+        for (text, line, expected) in [
+            ("", 1, "begin the file with a line x,y,z,nx,ny,nz"),
+            ("\n \n", 1, "begin the file"),
+            ("0.6,0,0.6,0,2,0\n", 1, "begin the file"),
+            ("\n\n0.6,0,0.6,0,2,0\n", 3, "begin the file"),
+            ("x,y,z,nx,ny,nz,w\n", 1, "begin the file"),
+            ("x,y,z,nx,ny,ny\n", 1, "begin the file"),
+            ("x,y,z,nx,ny,nz\n0,0,0,0,0,0\n", 2, "the normal is zero"),
+            ("x,y,z,nx,ny,nz\n0,0,0,0,1,0\n0,0,0,0,nan,0\n", 3, "\"nan\""),
+            ("\nx,y,z,nx,ny,nz\n\r\n\n0,up,0,0,1,0\n", 5, "\"up\" is not"),
+            (
+                "x,y,z,nx,ny,nz\n0,0,0,0,1,0\n\n0,0\n",
+                4,
+                "2 values; give six",
+            ),
+            ("x,y,z,nx,ny,nz\n0,0,0,0,1,0,\n", 2, "7 values"),
         ] {
             let error = read_points(text.as_bytes()).unwrap_err().to_string();
-            assert!(error.contains(line), "{text:?}: {error}");
+            assert!(
+                error.starts_with(&format!("line {line}: ")),
+                "{text:?}: {error}"
+            );
+            assert!(error.contains(expected), "{text:?}: {error}");
         }
+        let error = read_points(b"x,y,z,nx,ny,nz\n\n\xff").unwrap_err();
+        assert!(
+            error.to_string().starts_with("line 3: not UTF-8"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn points_are_read_as_spreadsheets_write_them() {
+        let text = "\u{feff}\"nx\", \"ny\", \"nz\", \"x\", \"y\", \"z\"\r\n\r\n0,1e-30,0,1,2,3\r\n";
+        let points = read_points(text.as_bytes()).unwrap();
+        assert_eq!(points.len(), 1);
+        assert_eq!(
+            (points[0].position, points[0].normal),
+            (Vec3::new(1.0, 2.0, 3.0), Vec3::Y)
+        );
+        assert!(read_points(b"x,y,z,nx,ny,nz").unwrap().is_empty());
     }
 }

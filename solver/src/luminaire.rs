@@ -3,13 +3,14 @@
 //! Point and spot: `E = I(a) cos b / r^2`, intensity `I` in W/sr, 1 on the axis at unit emission.
 //! Sun: `E = cos b` averaged over the directions of its disc, 1 on a surface that faces it. Sky: `E = 1/pi` times the cosine-weighted solid angle
 //! that escapes, estimated by 64 stratified directions for each receiver point. All are averaged
-//! over the Gauss points of the element and multiplied by visibility.
+//! over the Gauss points of the element and multiplied by visibility; the directions of an element's
+//! points interleave, so that its average is stratified more finely than any of them.
 //!
 //! Spot falloff: KHR_lights_punctual (Khronos 2018, "Inner and Outer Cone Angles"), or linear.
 
 use core::f32::consts::TAU;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use crate::geometry::{Polygon, gauss_points};
 use crate::math;
@@ -32,14 +33,15 @@ pub fn irradiance(
     far: f32,
     visibility: &impl Visibility,
 ) -> f32 {
-    gauss_points(receiver)
+    let points = gauss_points(receiver);
+    points
         .iter()
         .zip(0..)
         .map(|(point, index)| {
             let at = Receiver {
                 position: point.position,
                 normal: receiver.normal(),
-                rotation: TAU / 4.0 * index as f32 / SKY_STRATA as f32,
+                offset: offset(index, points.len() as u32),
             };
             point.weight * at.irradiance(source, far, visibility)
         })
@@ -60,16 +62,25 @@ pub fn at_point(
     let receiver = Receiver {
         position,
         normal,
-        rotation: 0.0,
+        offset: offset(0, 1),
     };
     receiver.irradiance(source, far, visibility)
 }
 
-/// A point that receives, and by how much its directions are turned against its neighbours'.
+/// A point that receives, and where its directions lie in their strata.
 struct Receiver {
     position: Vec3,
     normal: Vec3,
-    rotation: f32,
+    offset: Vec2,
+}
+
+/// Where point `index` of `count` puts its directions in every stratum, in (0, 1): its own place
+/// in radius and its own in angle, paired so that near ones in radius are far apart in angle.
+fn offset(index: u32, count: u32) -> Vec2 {
+    let place = |k: u32| (k as f32 + 0.5) / count as f32;
+    // Steps of two around an odd number of places reach all of them.
+    let partner = (2 * index + 1) % (count | 1);
+    Vec2::new(place(partner), place(index))
 }
 
 impl Receiver {
@@ -121,7 +132,7 @@ impl Receiver {
         let (u, v) = towards.any_orthonormal_pair();
         let edge = math::cos(angle / 2.0);
         let count = (SUN_STRATA * SUN_STRATA) as f32;
-        let sum: f32 = strata(SUN_STRATA, self.rotation)
+        let sum: f32 = strata(SUN_STRATA, self.offset)
             .map(|(x, y)| {
                 let share = x * x + y * y;
                 let along = 1.0 - share * (1.0 - edge);
@@ -136,7 +147,7 @@ impl Receiver {
     fn skylight(&self, far: f32, visibility: &impl Visibility) -> f32 {
         let (u, v) = self.normal.any_orthonormal_pair();
         let count = (SKY_STRATA * SKY_STRATA) as f32;
-        strata(SKY_STRATA, self.rotation)
+        strata(SKY_STRATA, self.offset)
             .map(|(x, y)| {
                 // Malley's method: the disc lifted to the hemisphere is cosine-weighted.
                 let height = math::safe_sqrt(1.0 - x * x - y * y);
@@ -154,13 +165,20 @@ impl Receiver {
     }
 }
 
-/// Centres of equal-area cells of the unit disc, turned by `rotation`.
-fn strata(side: u32, rotation: f32) -> impl Iterator<Item = (f32, f32)> {
-    let centre = move |i: u32| (i as f32 + 0.5) / side as f32;
+/// A point in each equal-area cell of the unit disc: `side` rings of `side` cells, with `offset`
+/// the place in every cell, as shares of its way outwards and around.
+///
+/// Any line through the centre halves every ring, so a horizontal or vertical horizon is met
+/// exactly. Rings are turned against each other by the golden ratio: a horizon along the edges of
+/// the cells of one ring then lies inside those of the others.
+fn strata(side: u32, offset: Vec2) -> impl Iterator<Item = (f32, f32)> {
+    /// (sqrt 5 - 1) / 2
+    const TURN: f32 = 0.618_034;
+    let share = move |cell: f32| cell / side as f32;
     (0..side).flat_map(move |i| {
         (0..side).map(move |j| {
-            let radius = math::safe_sqrt(centre(i));
-            let angle = TAU * centre(j) + rotation;
+            let radius = math::safe_sqrt(share(i as f32 + offset.x));
+            let angle = TAU * share(j as f32 + offset.y + TURN * i as f32);
             (radius * math::cos(angle), radius * math::sin(angle))
         })
     })
@@ -218,6 +236,7 @@ mod tests {
     use crate::color::Rgb;
     use crate::scene::Surface;
     use crate::visibility::Occluders;
+    use glam::Quat;
     use std::vec::Vec;
 
     fn square(size: f32, z: f32) -> [Vec3; 4] {
@@ -284,5 +303,69 @@ mod tests {
         // Four corner factors of a 1 x 1 square at distance 1 (Howell C-11): 0.5541.
         let open = at_origin(&Source::Sky, &[plate]);
         assert!((open - (1.0 - 0.5541)).abs() < 0.02, "{open}");
+    }
+    /// The sky over a black ground that ends at the horizon: `E = (1 + cos tilt) / 2`.
+    #[test]
+    fn tilted_planes_see_their_share_of_the_sky() {
+        let ground = Surface::new(0, &square(1e5, 0.0), Rgb::BLACK).unwrap();
+        let mut squares = [0.0, 0.0];
+        let angles = || (0..24).map(|step| 15.0 * step as f32);
+        for (tilt, azimuth) in angles()
+            .take(7)
+            .flat_map(|tilt| angles().map(move |azimuth| (tilt, azimuth)))
+        {
+            let turned = |point: Vec3| {
+                let tilted = Quat::from_rotation_x(f32::to_radians(tilt)) * point;
+                Quat::from_rotation_z(f32::to_radians(azimuth)) * tilted + Vec3::Z
+            };
+            let outline = square(0.01, 0.0).map(turned);
+            let expected = (1.0 + f32::cos(tilt.to_radians())) / 2.0;
+            for (corners, square) in [3, 4].into_iter().zip(&mut squares) {
+                let plane = Polygon::new(&outline[..corners]).unwrap();
+                let found = irradiance(&Source::Sky, &plane, 1e4, &Occluders(&[ground]));
+                let error = (found - expected).abs();
+                // Along the axes, horizontal and vertical planes are exact by symmetry.
+                let is_exact = tilt % 90.0 == 0.0 && azimuth % 90.0 == 0.0;
+                let bound = if is_exact { 1e-6 } else { 0.01 };
+                assert!(
+                    error < bound,
+                    "{corners} corners, tilt {tilt}, azimuth {azimuth}: {found} is not {expected}"
+                );
+                *square += error * error / (7.0 * 24.0);
+            }
+        }
+        // The points of an element interleave: the same 64 directions at each err twice as much.
+        let rms = squares.map(f32::sqrt);
+        assert!(rms.iter().all(|rms| *rms < 0.005), "{rms:?}");
+    }
+
+    /// A blade over part of the disc leaves the segment beyond its edge, of the share
+    /// `(acos c - c sqrt(1 - c^2)) / pi` with the edge at `c` radii from the middle.
+    #[test]
+    fn a_blade_uncovers_the_sun_steadily() {
+        const RADIUS: f32 = 0.05;
+        let sun = Source::Sun {
+            direction: -Vec3::Z,
+            angle: 2.0 * RADIUS,
+        };
+        for turn in (0..8).map(|step| 0.1 + 0.785 * step as f32) {
+            for c in (-4..=4).map(|step| 0.22 * step as f32) {
+                let blade = square(10.0, 1.0).map(|corner| {
+                    let shifted = corner + Vec3::X * (c * f32::tan(RADIUS) - 10.0);
+                    Quat::from_rotation_z(turn) * shifted
+                });
+                let blade = Surface::new(0, &blade, Rgb::BLACK).unwrap();
+                let outline = square(1e-5, 0.0);
+                let receiver = Polygon::new(&outline).unwrap();
+                let found = irradiance(&sun, &receiver, 100.0, &Occluders(&[blade]));
+                let expected = (c.acos() - c * (1.0 - c * c).sqrt()) / core::f32::consts::PI;
+                // 16 directions, at most two of them on the wrong side.
+                let error = (found - expected).abs();
+                assert!(
+                    error < 2.0 / 16.0,
+                    "turn {turn}, edge at {c}: {found} is not {expected}"
+                );
+            }
+        }
     }
 }

@@ -355,6 +355,7 @@ mod tests {
             quantity: Quantity::Irradiance,
             lights: &entries,
             elements: ELEMENTS,
+            errors: None,
             mesh: None,
         };
         let mut bytes = vec![0; size(&contents).unwrap()];

@@ -51,6 +51,7 @@ fn of_solution(solution: &Solution) -> Value {
     })
 }
 
+/// Errors are those that were measured when it was packed, null if they were not, in display codes.
 /// Flash is the atlas itself; RAM and work are those of the integer kernel: three `u32` sums per
 /// element, three `u16` weights per light, one multiply-add per code and channel.
 fn of_atlas(atlas: &Atlas, bytes: usize) -> Value {
@@ -59,8 +60,10 @@ fn of_atlas(atlas: &Atlas, bytes: usize) -> Value {
             "name": light.name,
             "emission": light.emission.to_array(),
             "scale": light.scale.value(),
+            "max_error_codes": light.error,
         })
     });
+    let worst = atlas.worst_error();
     let (n, k) = (
         u64::from(atlas.element_count()),
         u64::from(atlas.light_count()),
@@ -76,6 +79,8 @@ fn of_atlas(atlas: &Atlas, bytes: usize) -> Value {
         },
         "elements": n,
         "faces": atlas.mesh().map_or(0, |mesh| mesh.face_count()),
+        "max_error_codes": worst.map(|worst| worst.packed),
+        "codes_shown": worst.map(|worst| worst.shown),
         "code_bytes": atlas.all_codes().len(),
         "flash": bytes,
         "ram": n * 12 + k * 6,

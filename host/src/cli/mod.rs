@@ -99,7 +99,13 @@ fn one_line(error: &anyhow::Error) -> String {
             line = line + separator + &cause;
         }
     }
-    line.replace('\n', " ")
+    // Names of files and lights may hold anything; none of it moves the cursor.
+    let visible = |sign: char| match sign {
+        '\n' => " ".to_owned(),
+        sign if sign.is_control() => sign.escape_default().to_string(),
+        sign => sign.to_string(),
+    };
+    line.chars().map(visible).collect()
 }
 
 /// A line for people, on stderr. That nobody can read it (a closed pipe) does not end the work.
@@ -113,7 +119,8 @@ use tell;
 
 /// The output path: as given, or the input's name with another extension, in this folder.
 ///
-/// With `--json`, stdout is taken; a result that should go there as well is wrong usage.
+/// With `--json`, stdout is taken; a result that should go there as well is wrong usage. An output
+/// that is the input ends the program, see [`keep`].
 fn output_path(given: Option<&Path>, input: &Path, extension: &str, json: bool) -> PathBuf {
     let path = given.map_or_else(
         || {
@@ -125,7 +132,20 @@ fn output_path(given: Option<&Path>, input: &Path, extension: &str, json: bool) 
     if json && path == Path::new("-") {
         wrong_usage("with --json, stdout holds the report: give -o a file name");
     }
+    keep(input, &path);
     path
+}
+
+/// Ends the program with exit 1 when `output` is the file `input`, which nobody wants to lose.
+fn keep(input: &Path, output: &Path) {
+    let [input_file, output_file] = [input, output].map(|path| path.canonicalize().ok());
+    if input_file.is_some_and(|file| file.is_file() && output_file == Some(file)) {
+        tell!(
+            "relume: {}: this is an input, which -o would overwrite; give -o another name",
+            output.display()
+        );
+        std::process::exit(1);
+    }
 }
 
 fn wrong_usage(message: &str) -> ! {

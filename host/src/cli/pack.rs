@@ -10,7 +10,7 @@ use serde_json::json;
 
 use super::load::{Loaded, load};
 use super::{Outcome, human_bytes, output_path, tell, write_file};
-use crate::pack::{Format, pack, packing_error};
+use crate::pack::{Format, pack_measured};
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -59,9 +59,8 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
         },
         mesh: !arguments.no_mesh,
     };
-    let bytes = pack(&solution, format).with_context(|| path.clone())?;
+    let (bytes, error) = pack_measured(&solution, format).context(path)?;
     let atlas = Atlas::parse(&bytes)?;
-    let error = packing_error(&solution, &atlas)?;
     write_file(&output, &bytes)?;
     tell!(
         "{}: {}, {} for {} codes, error at most {:.2} display codes ({}), {:.2} as shown",

@@ -7,7 +7,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::load::{Loaded, load, read};
-use super::{Outcome, output_path, tell, write_file};
+use super::{Outcome, keep, output_path, tell, write_file};
 use crate::probe::{Part, ProbeError, Probed, probe_elements, probe_points, read_points};
 
 #[derive(Debug, Args)]
@@ -36,7 +36,10 @@ struct Places {
 }
 
 pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
-    let output = output_path(Some(&arguments.output), Path::new("-"), "csv", json);
+    let output = output_path(Some(&arguments.output), &arguments.input, "csv", json);
+    if let Some(file) = &arguments.places.points {
+        keep(file, &output);
+    }
     let loaded = load(&arguments.input)?;
     if loaded.is_radiosity() {
         bail!(

@@ -6,15 +6,16 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use glam::Vec3;
 use relume::color::Rgb;
+use relume::geometry::Polygon;
 use serde_json::json;
 
 use super::load::{Loaded, load};
-use super::{Outcome, output_path, tell, write_file};
+use super::{Outcome, keep, output_path, tell, write_file};
 use crate::export::exr;
 use crate::mesh::OwnedMesh;
 use crate::mix::{Setting, mix};
 use crate::picture::{self, Exposure};
-use crate::preview::{Camera, Relit, Viewpoint, render, show};
+use crate::preview::{Camera, CameraError, Relit, Viewpoint, render, show};
 
 /// Behind everything.
 pub const BACKGROUND: [u8; 3] = [0, 0, 0];
@@ -24,10 +25,10 @@ pub struct Arguments {
     /// A solution or an atlas
     input: PathBuf,
     /// Set a light: 0.5 (of nominal), #ffcc88, 2x#ffcc88, or r,g,b; unset ones stay nominal
-    #[arg(long, value_name = "LIGHT=VALUE")]
+    #[arg(long, value_name = "LIGHT=VALUE", allow_hyphen_values = true)]
     set: Vec<Setting>,
     /// The same, but all other lights are off
-    #[arg(long, value_name = "LIGHT=VALUE")]
+    #[arg(long, value_name = "LIGHT=VALUE", allow_hyphen_values = true)]
     only: Vec<Setting>,
     /// Where the picture goes: .png, or .exr (linear, unexposed); `-` is stdout, as PNG
     /// [default: the input's name .png, here]
@@ -55,11 +56,11 @@ struct CameraArguments {
     /// What it looks at
     #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
     target: Option<Vec3>,
-    /// What is up
+    /// What is up, also for what the program chooses [default: 0,1,0]
     #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
     up: Option<Vec3>,
     /// Vertical field of view in radians
-    #[arg(long, value_name = "RADIANS")]
+    #[arg(long, value_name = "RADIANS", allow_hyphen_values = true)]
     fov: Option<f32>,
 }
 
@@ -82,7 +83,14 @@ impl CameraArguments {
         if let Some(file) = &self.camera {
             return Ok(Viewpoint::from_toml_file(file)?);
         }
-        let chosen = Viewpoint::fit(&loaded.solution().surfaces, aspect);
+        let solution = loaded.solution();
+        let faces = solution.mesh.faces.iter();
+        let lit = faces.filter(|face| face.element_count > 0);
+        let lit: Vec<Polygon> = lit.map(|face| face.polygon).collect();
+        let surfaces = &solution.surfaces;
+        let shown = if lit.is_empty() { surfaces } else { &lit };
+        let up = self.up.unwrap_or(Vec3::Y);
+        let chosen = Viewpoint::fit(shown, surfaces, up, aspect);
         let chosen = chosen.context("the scene has no surfaces to look at")?;
         Ok(Viewpoint {
             eye: self.eye.unwrap_or(chosen.eye),
@@ -91,11 +99,24 @@ impl CameraArguments {
             fov: self.fov.unwrap_or(chosen.fov),
         })
     }
+
+    /// The error with what it is about.
+    fn named(&self, error: CameraError) -> anyhow::Error {
+        let origin = match (&error, &self.camera) {
+            (CameraError::Size(..), _) => "--size".to_owned(),
+            (_, Some(file)) => file.display().to_string(),
+            (_, None) => "camera".to_owned(),
+        };
+        anyhow::Error::new(error).context(origin)
+    }
 }
 
 pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     let path = arguments.input.display().to_string();
     let output = output_path(arguments.output.as_deref(), &arguments.input, "png", json);
+    if let Some(file) = &arguments.camera.camera {
+        keep(file, &output);
+    }
     let is_exr = has_extension(&output, "exr");
     if !is_exr && !has_extension(&output, "png") && output != Path::new("-") {
         bail!(
@@ -121,7 +142,8 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     let (width, height) = arguments.size;
     let aspect = width as f32 / height as f32;
     let viewpoint = arguments.camera.viewpoint(&loaded, aspect)?;
-    let camera = Camera::new(viewpoint, width, height).context("camera")?;
+    let camera = Camera::new(viewpoint, width, height);
+    let camera = camera.map_err(|error| arguments.camera.named(error))?;
 
     let (bytes, exposure) = if is_exr {
         (

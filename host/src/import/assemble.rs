@@ -21,6 +21,9 @@ use crate::texture::{SurfaceTexture, clamp_reflectance};
 /// Most lights of a scene: tags are stored in 16 bits.
 pub(super) const MAX_LIGHTS: usize = 65_535;
 
+/// Longest name of a light, in bytes: atlases store lengths in 16 bits.
+const MAX_NAME: usize = 65_535;
+
 /// The scene of a draft; `path` is the file that errors name.
 pub(super) fn assemble(
     path: &Path,
@@ -33,6 +36,16 @@ pub(super) fn assemble(
             path: path.to_owned(),
             lights: groups.lights.len(),
         });
+    }
+
+    if let Some(light) = groups.lights.iter().find(|l| l.name.len() > MAX_NAME) {
+        let start: String = light.name.chars().take(20).collect();
+        let length = light.name.len();
+        return Err(ImportError::part(
+            path,
+            format_args!("light \"{}...\"", start.escape_debug()),
+            format_args!("a name of {length} bytes; shorten it to at most {MAX_NAME}"),
+        ));
     }
 
     let mut luminaires = Vec::new();
@@ -340,6 +353,20 @@ mod tests {
             error
                 .to_string()
                 .starts_with("many: 65536 lights, but at most 65535 fit")
+        );
+    }
+
+    #[test]
+    fn a_name_that_no_atlas_can_hold_is_refused() {
+        let named = |length| Draft {
+            entries: vec![lamp(&"n".repeat(length), [1.0; 3])],
+            ..Draft::default()
+        };
+        let import = |length| assemble(Path::new("x"), named(length), &mut Repairs::default());
+        assert!(import(MAX_NAME).is_ok());
+        assert_eq!(
+            import(MAX_NAME + 1).unwrap_err().to_string(),
+            "x, light \"nnnnnnnnnnnnnnnnnnnn...\": a name of 65536 bytes; shorten it to at most 65535"
         );
     }
 }

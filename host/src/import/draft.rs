@@ -61,6 +61,21 @@ pub(super) struct Outline {
     pub uv: Vec<Vec2>,
 }
 
+/// Largest coordinate of a vertex: up to here, squares of areas stay finite in `f32`.
+const FARTHEST: f32 = 1e8;
+
+/// Refuses vertices so far away that areas would overflow.
+pub(super) fn check_reach<'a>(vertices: impl IntoIterator<Item = &'a Vec3>) -> Result<(), String> {
+    let far = |vertex: &&Vec3| vertex.abs().max_element() > FARTHEST;
+    match vertices.into_iter().find(far) {
+        None => Ok(()),
+        Some(Vec3 { x, y, z }) => Err(format!(
+            "vertex ({x:e}, {y:e}, {z:e}) is too far away; scale the scene down to coordinates of at \
+             most {FARTHEST:e}"
+        )),
+    }
+}
+
 /// One luminaire, or all surfaces of one material: what a light group is made of.
 #[derive(Clone, Debug)]
 pub(super) struct Entry {

@@ -30,8 +30,12 @@ pub(super) fn read(path: &Path, repairs: &mut Repairs) -> Result<Draft, ImportEr
     let bytes = read_bytes(path)?;
     let (text, blob) = split(path, &bytes)?;
     check_requirements(path, &text)?;
-    let root = Root::from_slice(&text)
-        .map_err(|error| ImportError::file(path, format_args!("no legal glTF: {error}")))?;
+    let root = Root::from_slice(&text).map_err(|error| {
+        ImportError::file(
+            path,
+            format_args!("no legal glTF: {error}; export it again"),
+        )
+    })?;
     let mut reader = Reader {
         path,
         root: &root,
@@ -542,7 +546,7 @@ mod tests {
             ),
             (
                 scene(r#"{"mesh":0,"scale":[1e30,1e30,1e30]}"#),
-                "area overflows",
+                "vertex (1e30, 0e0, 0e0) is too far away; scale the scene down",
             ),
             (
                 scene(r#"{"scale":[1e38,1,1],"children":[1]},{"mesh":0,"scale":[1e38,1,1]}"#),

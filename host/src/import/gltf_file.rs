@@ -35,8 +35,12 @@ pub(super) fn split(path: &Path, bytes: &[u8]) -> Result<(Vec<u8>, Option<Vec<u8
     if length < GLB_HEADER {
         return Err(cut_off());
     }
-    let glb = ::gltf::Glb::from_slice(bytes)
-        .map_err(|error| ImportError::file(path, format_args!("no legal GLB: {error}")))?;
+    let glb = ::gltf::Glb::from_slice(bytes).map_err(|error| {
+        ImportError::file(
+            path,
+            format_args!("no legal GLB: {error}; export or copy it again"),
+        )
+    })?;
     Ok((glb.json.into_owned(), glb.bin.map(|bin| bin.into_owned())))
 }
 
@@ -55,8 +59,12 @@ struct Asset {
 
 /// Refuses other versions, and extensions that a file requires and nobody here understands.
 pub(super) fn check_requirements(path: &Path, text: &[u8]) -> Result<(), ImportError> {
-    let Requirements { asset, extensions } = serde_json::from_slice(text)
-        .map_err(|error| ImportError::file(path, format_args!("no legal glTF: {error}")))?;
+    let Requirements { asset, extensions } = serde_json::from_slice(text).map_err(|error| {
+        ImportError::file(
+            path,
+            format_args!("no legal glTF: {error}; export or copy it again"),
+        )
+    })?;
     if !asset.version.starts_with("2.") {
         let version = asset.version;
         return Err(ImportError::file(

@@ -20,7 +20,7 @@ use relume::geometry::Polygon;
 use relume::scene::{self, Luminaire, Source};
 use serde::Deserialize;
 
-use super::draft::{Draft, Emitter, Entry, Glow, Material, Outline, Replacement};
+use super::draft::{Draft, Emitter, Entry, Glow, Material, Outline, Replacement, check_reach};
 use super::error::{ImportError, read_text};
 use super::repairs::Repairs;
 
@@ -277,6 +277,7 @@ impl Written {
         let polygon = self.polygon.as_ref();
         let polygon = polygon.ok_or("an area light needs `polygon = [[x, y, z], ...]`")?;
         let vertices: Vec<Vec3> = polygon.iter().copied().map(Vec3::from).collect();
+        check_reach(&vertices).map_err(|fault| format!("`polygon`: {fault}"))?;
         Polygon::new(&vertices).map_err(|fault| format!("`polygon`: {fault}"))?;
         let reflectance = self
             .reflectance
@@ -488,6 +489,10 @@ mod tests {
             (
                 "name = 'x'\nkind = 'spot'\nposition = [0,0,0]\ndirection = [0,0,1]\ninner = 1\nouter = 0.5\nemission = 1",
                 "0 <= inner <= outer <= pi",
+            ),
+            (
+                "name = 'x'\nkind = 'area'\npolygon = [[0,0,0],[1,0,0],[0,2e10,0]]\nemission = 1",
+                "`polygon`: vertex (0e0, 2e10, 0e0) is too far away; scale",
             ),
             (
                 "name = 'x'\nkind = 'area'\npolygon = [[0,0,0],[1,0,0]]\nemission = 1",

@@ -52,6 +52,8 @@ pub fn load(scene: &Path, lights: Option<&Path>) -> Result<Imported, ImportError
     let mut repairs = Repairs::default();
     let mut draft = read(scene, &mut repairs)?;
     let polygons = draft.outlines.len();
+    draft::check_reach(draft.outlines.iter().flat_map(|outline| &outline.vertices))
+        .map_err(|fault| ImportError::file(scene, fault))?;
     draft.outlines = polygons::legalize(draft.outlines, &draft.materials, &mut repairs)
         .map_err(|fault| ImportError::file(scene, fault))?;
     if draft.outlines.is_empty() {

@@ -1,8 +1,8 @@
 //! The materials of MTL files: `Kd` is the reflectance, `Ke` the emitted radiance, both linear.
 //!
 //! OBJ knows no sides, so every surface reflects on both. A texture (`map_Kd`, sRGB, found beside
-//! the MTL file) multiplies `Kd`, which is then white unless given; its options are ignored. A
-//! material without `Kd` and texture has the default reflectance. Where a name is defined twice,
+//! the MTL file) multiplies `Kd`, which is then white unless given; its options are ignored, and
+//! so are, with a count, all other images (`map_Ke`, `bump`). A material without `Kd` and texture has the default reflectance. Where a name is defined twice,
 //! the later definition holds.
 
 use std::collections::HashMap;
@@ -87,8 +87,9 @@ impl Library {
         path: &Path,
         repairs: &mut Repairs,
     ) -> Result<Vec<tobj::Material>, ImportError> {
-        let plain = plain_mtl(&read_text(path)?)
+        let (plain, ignored) = plain_mtl(&read_text(path)?)
             .map_err(|(line, fault)| ImportError::line(path, line, fault))?;
+        repairs.ignored_textures += ignored;
         let (parsed, _) = tobj::load_mtl_buf(&mut plain.as_bytes())
             .map_err(|error| ImportError::file(path, error))?;
         for material in &parsed {

@@ -192,12 +192,13 @@ fn index(word: &str, defined: usize, what: &str) -> Result<usize, String> {
     })
 }
 
-/// Brings an MTL file into plain form.
+/// Brings an MTL file into plain form; also how many statements name images that are not used.
 ///
 /// # Errors
 /// The first line that names nothing or has the wrong numbers.
-pub(super) fn plain_mtl(text: &str) -> Result<String, LineFault> {
+pub(super) fn plain_mtl(text: &str) -> Result<(String, usize), LineFault> {
     let mut plain = String::new();
+    let mut ignored = 0;
     for (number, statement) in statements(text) {
         let (keyword, rest) = split(&statement);
         let kept = match keyword {
@@ -206,14 +207,22 @@ pub(super) fn plain_mtl(text: &str) -> Result<String, LineFault> {
                 return Err((number, format!("`{keyword}` without a name; add one")));
             }
             "newmtl" | "map_Kd" => rest.to_owned(),
-            _ => continue,
+            _ => {
+                ignored += usize::from(is_image(keyword));
+                continue;
+            }
         };
         plain.push_str(keyword);
         plain.push(' ');
         plain.push_str(&kept);
         plain.push('\n');
     }
-    Ok(plain)
+    Ok((plain, ignored))
+}
+
+/// True for statements that name an image.
+fn is_image(keyword: &str) -> bool {
+    keyword.starts_with("map_") || matches!(keyword, "bump" | "disp" | "decal" | "norm" | "refl")
 }
 
 /// `r g b`; a single number stands for all three.
@@ -280,8 +289,13 @@ mod tests {
         let plain = plain_mtl("newmtl a b\n\tKd 0.5\nKe 1 2 3\nd x\nmap_Kd -s 1 1 1 t.png\nKs 1\n");
         assert_eq!(
             plain.unwrap(),
-            "newmtl a b\nKd 0.5 0.5 0.5\nKe 1 2 3\nmap_Kd -s 1 1 1 t.png\n"
+            (
+                "newmtl a b\nKd 0.5 0.5 0.5\nKe 1 2 3\nmap_Kd -s 1 1 1 t.png\n".to_owned(),
+                0
+            )
         );
+        let images = "newmtl a\nmap_Ke glow.png\nmap_Ka x.png\nbump b.png\nnorm n.png\nillum 2\n";
+        assert_eq!(plain_mtl(images).unwrap(), ("newmtl a\n".to_owned(), 4));
         assert_eq!(plain_mtl("\nKd 1 2").unwrap_err().0, 2);
         assert_eq!(plain_mtl("Kd spectral f.rfl").unwrap_err().0, 1);
         assert_eq!(plain_mtl("newmtl").unwrap_err().0, 1);

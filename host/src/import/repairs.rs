@@ -36,6 +36,9 @@ pub struct Repairs {
     pub missing_texture_coordinates: usize,
     /// Materials whose texture options (scale, offset, clamping) were ignored.
     pub ignored_texture_options: usize,
+    /// Images of materials that were ignored, because they are not of the reflectance: OBJ's
+    /// `map_Ke`, `map_d`, `bump` and their like.
+    pub ignored_textures: usize,
     /// Materials whose emissive image was replaced by its mean.
     pub averaged_emissive_textures: usize,
     /// Materials whose metallic factor was ignored.
@@ -98,6 +101,10 @@ impl Repairs {
             (
                 self.ignored_texture_options,
                 "materials with texture options ignored",
+            ),
+            (
+                self.ignored_textures,
+                "textures of emission, relief and the like ignored",
             ),
             (
                 self.averaged_emissive_textures,
@@ -173,6 +180,7 @@ mod tests {
             missing_textures: 1,
             missing_texture_coordinates: 1,
             ignored_texture_options: 1,
+            ignored_textures: 1,
             averaged_emissive_textures: 1,
             ignored_metallic: 1,
             ignored_vertex_colours: 1,

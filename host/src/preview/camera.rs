@@ -63,19 +63,19 @@ pub enum CameraError {
         error: Box<CameraError>,
     },
     /// A coordinate or an angle is NaN or infinite.
-    #[error("a coordinate or the field of view is not a finite number")]
+    #[error("a coordinate or the field of view is not a finite number; correct it")]
     NotFinite,
     /// Eye and target are the same point.
-    #[error("eye and target are the same point")]
+    #[error("eye and target are the same point; move one of them")]
     NoDirection,
     /// Up is zero or points along the view.
     #[error("up is zero or parallel to the view; choose another up")]
     NoUp,
     /// The field of view is outside (0, pi).
-    #[error("the field of view {0} is outside (0, pi) radians")]
+    #[error("the field of view {0} is outside (0, pi) radians; about 1 is usual")]
     Fov(f32),
     /// A side is zero or above [`MAX_SIDE`].
-    #[error("a picture of {0} x {1} pixels: each side must lie in 1..={MAX_SIDE}")]
+    #[error("a picture of {0} x {1} pixels; choose sides in 1..={MAX_SIDE}")]
     Size(u32, u32),
     /// There is nothing to look at.
     #[error("the scene has no surfaces to look at")]

@@ -1,6 +1,8 @@
 //! The camera that is used when nobody says where to stand.
 //!
-//! Up is +Y, as glTF and OBJ scenes have it. The rule, from the bounding box of all surfaces:
+//! Up is +Y, as glTF and OBJ scenes have it, unless the user says otherwise; a scene with another up
+//! is turned until it is +Y. The rule, from the bounding box of what is to be seen, which lamps
+//! and other black surfaces beside it only block:
 //! * A side of the box (+z, -z, +x, -x) is *open* when at most a quarter of 8 x 8 parallel rays
 //!   that enter through it meet a surface in the first quarter of the box.
 //! * One or two open sides: a room that is cut open. Stand outside the most open one, look
@@ -9,7 +11,7 @@
 //! * None: a closed room. Stand inside, towards one of the four corners, a little above the middle, where the mean
 //!   free view is longest, and look at the middle of the box.
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use relume::geometry::Polygon;
 
 use super::camera::{Camera, CameraError, FOV, Viewpoint};
@@ -77,31 +79,52 @@ impl Camera {
     /// [`CameraError::NothingToSee`] without polygons, [`CameraError::Size`].
     pub fn fit(polygons: &[Polygon], width: u32, height: u32) -> Result<Self, CameraError> {
         let aspect = width as f32 / height.max(1) as f32;
-        let view = Viewpoint::fit(polygons, aspect).ok_or(CameraError::NothingToSee)?;
+        let view =
+            Viewpoint::fit(polygons, polygons, Vec3::Y, aspect).ok_or(CameraError::NothingToSee)?;
         Self::new(view, width, height)
     }
 }
 
 impl Viewpoint {
-    /// Where to stand by default, for a picture `aspect` times as wide as high; `None` without
-    /// polygons. Up is +Y.
+    /// Where to stand by default to see the polygons `shown` among all `surfaces`, for a picture
+    /// `aspect` times as wide as high; `None` when nothing is shown. `up` may have any length; sides
+    /// are named as if it were +Y, which it is taken for when it has none.
     ///
     /// A room with one or two open sides (of +z, -z, +x, -x) is seen straight through the most
     /// open one, a closed room from the inner corner with the longest mean free view, and what is
     /// open on more sides from outside and above. A side is open when at most a quarter of the
     /// rays that enter there meet a surface in the first quarter of the scene's bounding box.
     #[must_use]
-    pub fn fit(polygons: &[Polygon], aspect: f32) -> Option<Self> {
-        let bounds = Bounds::new(polygons)?;
-        let blocked = SIDES.map(|side| (blocked_share(polygons, bounds, side), side));
+    pub fn fit(shown: &[Polygon], surfaces: &[Polygon], up: Vec3, aspect: f32) -> Option<Self> {
+        let up = up.try_normalize().unwrap_or(Vec3::Y);
+        let upright = Quat::from_rotation_arc(up, Vec3::Y);
+        let surfaces = turned(surfaces, upright);
+        let bounds = Bounds::new(&turned(shown, upright))?;
+        let blocked = SIDES.map(|side| (blocked_share(&surfaces, bounds, side), side));
         let open = blocked.iter().filter(|(share, _)| *share <= OPEN);
         let most_open = open.clone().min_by(|a, b| a.0.total_cmp(&b.0));
-        Some(match (open.count(), most_open) {
+        let view = match (open.count(), most_open) {
             (1 | 2, Some((_, side))) => outside(bounds, *side, aspect),
             (3.., _) => outside(bounds, OBLIQUE.normalize(), aspect),
-            _ => inside(polygons, bounds, aspect),
+            _ => inside(&surfaces, bounds, aspect),
+        };
+        let back = upright.inverse();
+        Some(Self {
+            eye: back * view.eye,
+            target: back * view.target,
+            up,
+            ..view
         })
     }
+}
+
+/// The polygons after a rotation; what rounding leaves without an area is left out.
+fn turned(polygons: &[Polygon], rotation: Quat) -> Vec<Polygon> {
+    let turned = polygons.iter().filter_map(|polygon| {
+        let vertices = polygon.vertices().iter().map(|vertex| rotation * *vertex);
+        Polygon::new(&vertices.collect::<Vec<_>>()).ok()
+    });
+    turned.collect()
 }
 
 /// True when something stands between two points.

@@ -585,11 +585,51 @@ fn room(without: &[Vec3]) -> Vec<Polygon> {
     polygons
 }
 
+fn fit(polygons: &[Polygon], up: Vec3, aspect: f32) -> Option<Viewpoint> {
+    Viewpoint::fit(polygons, polygons, up, aspect)
+}
+
+#[test]
+fn lamps_beside_the_scene_do_not_make_it_small() {
+    let shown = room(&[Vec3::Z]);
+    let alone = fit(&shown, Vec3::Y, 1.5);
+    let far = [(0.0, 0.0), (9.0, 0.0), (0.0, 9.0)].map(|(x, z)| Vec3::new(x, 40.0, z));
+    let mut surfaces = shown.clone();
+    surfaces.push(Polygon::new(&far).unwrap());
+    assert_eq!(Viewpoint::fit(&shown, &surfaces, Vec3::Y, 1.5), alone);
+    assert_ne!(fit(&surfaces, Vec3::Y, 1.5), alone);
+}
+
+#[test]
+fn a_scene_that_stands_on_another_side_is_seen_the_same() {
+    let turn = glam::Quat::from_rotation_x(std::f32::consts::FRAC_PI_2); // +Y becomes +Z
+    for without in [&[Vec3::Z][..], &[], &[Vec3::X, Vec3::NEG_X, Vec3::Z]] {
+        let upright = room(without);
+        let lying: Vec<Polygon> = upright
+            .iter()
+            .map(|p| {
+                let vertices: Vec<Vec3> = p.vertices().iter().map(|v| turn * *v).collect();
+                Polygon::new(&vertices).unwrap()
+            })
+            .collect();
+        let expected = fit(&upright, Vec3::Y, 1.5).unwrap();
+        let found = fit(&lying, Vec3::Z * 7.0, 1.5).unwrap();
+        for (a, b) in [
+            (found.eye, expected.eye),
+            (found.target, expected.target),
+            (found.up, expected.up),
+        ] {
+            assert!((a - turn * b).length() < 1e-4, "{found:?} {expected:?}");
+        }
+        assert_eq!(found.fov, expected.fov);
+    }
+}
+
 #[test]
 fn an_open_room_is_seen_through_its_opening() {
     for side in [Vec3::Z, Vec3::NEG_Z, Vec3::X, Vec3::NEG_X] {
         for aspect in [0.5, 1.0, 1.6] {
-            let view = Viewpoint::fit(&room(&[side]), aspect).unwrap();
+            let view = fit(&room(&[side]), Vec3::Y, aspect).unwrap();
             let middle = Vec3::new(2.0, 1.5, 3.0);
             assert_eq!(view.target, middle);
             assert!((view.eye - middle).normalize().dot(side) > 0.9999, "{side}");
@@ -609,13 +649,13 @@ fn an_open_room_is_seen_through_its_opening() {
 
 #[test]
 fn a_closed_room_is_seen_from_inside_and_a_thing_from_above() {
-    let view = Viewpoint::fit(&room(&[]), 1.5).unwrap();
+    let view = fit(&room(&[]), Vec3::Y, 1.5).unwrap();
     assert!(view.eye.cmpgt(Vec3::ZERO).all() && view.eye.cmplt(Vec3::new(4.0, 3.0, 6.0)).all());
     let open = [Vec3::X, Vec3::NEG_X, Vec3::Z, Vec3::NEG_Z, Vec3::Y];
     let floor = room(&open);
-    let view = Viewpoint::fit(&floor, 1.5).unwrap();
+    let view = fit(&floor, Vec3::Y, 1.5).unwrap();
     assert!(view.eye.y > 1.0);
-    assert!(Viewpoint::fit(&[], 1.0).is_none());
+    assert!(fit(&[], Vec3::Y, 1.0).is_none());
     assert!(matches!(
         Camera::fit(&[], 4, 4),
         Err(CameraError::NothingToSee)

@@ -1,7 +1,7 @@
 //! The bytes of a `.solution` file.
 //!
 //! Version 1, little-endian: `RELUMESO`, `u16` version, `u16` flags (1: direct light is kept
-//! apart), five `u32` counts (surfaces, faces, patches, elements, lights), `u32` rows evaluated,
+//! apart; the others are 0), five `u32` counts (surfaces, faces, patches, elements, lights), `u32` rows evaluated,
 //! `2 f32` spacing (patch, element); then
 //!
 //! | part | each |
@@ -14,7 +14,10 @@
 //! | contributions | `3 f32` per element and light, light inside |
 //! | direct part | likewise, with flag 1 |
 //!
-//! and a CRC-32 (ISO-HDLC) of everything before it, `u32`. Areas are computed again when read.
+//! Faces stand in the order of their surfaces, front before back, and without a light their share is
+//! 0; patches and elements stand face by face, each face's elements where it says.
+//!
+//! At the end stands a CRC-32 (ISO-HDLC) of everything before it, `u32`. Areas are computed again when read.
 
 use crc::{CRC_32_ISO_HDLC, Crc};
 use glam::{Vec2, Vec3};
@@ -167,6 +170,13 @@ pub fn read(bytes: &[u8]) -> Result<Solution, FileError> {
         return Err(FileError::Version(version));
     }
     let flags = u16::from_le_bytes(input.take()?);
+    if flags & !HAS_DIRECT != 0 {
+        let index = usize::from(flags);
+        return Err(FileError::Illegal {
+            what: "flags",
+            index,
+        });
+    }
     let counts = Counts {
         surfaces: input.u32()? as usize,
         faces: input.u32()? as usize,
@@ -224,18 +234,27 @@ fn read_mesh(
     surfaces: &[Polygon],
 ) -> Result<OwnedMesh, FileError> {
     let mut first_element = 0_u32;
+    let mut last = None;
     let faces = input.table("faces", counts.faces, 32, |input| {
         let face = input.face(surfaces, counts.lights)?;
-        let Some(face) = face.filter(|face| face.first_element == first_element) else {
+        let in_order = |face: &Face| {
+            let place = Some((face.surface, face.side == Side::Back));
+            face.first_element == first_element && std::mem::replace(&mut last, place) < place
+        };
+        let Some(face) = face.filter(in_order) else {
             return Ok(None);
         };
         first_element = first_element.saturating_add(face.element_count);
         Ok(Some(face))
     })?;
+    let mut least = 0;
     let patches = input.table("patches", counts.patches, 20, |input| {
         let face = input.u32()?;
         let corners = input.corners()?;
-        let outline = faces.get(face as usize).map(|face| &face.polygon);
+        let in_order = face >= least;
+        least = face;
+        let outline = faces.get(face as usize).filter(|_| in_order);
+        let outline = outline.map(|face| &face.polygon);
         Ok(corners.zip(outline).map(|((from, to), outline)| Patch {
             face,
             from,
@@ -243,14 +262,16 @@ fn read_mesh(
             area: outline.part(from, to).area(),
         }))
     })?;
+    let mut number = 0..;
     let elements = input.table("elements", counts.elements, 32, |input| {
         let patch = input.u32()?;
         let corners = input.corners()?;
         let reflectance = Reflectance::new(input.rgb()?);
         let face = patches.get(patch as usize).map(|patch| patch.face);
-        let outline = face
-            .and_then(|face| faces.get(face as usize))
-            .map(|f| &f.polygon);
+        let face = face.and_then(|face| faces.get(face as usize));
+        let number = number.next();
+        let owns = |face: &&Face| number.is_some_and(|n| face.element_range().contains(&n));
+        let outline = face.filter(owns).map(|face| &face.polygon);
         let parts = corners.zip(outline).zip(reflectance);
         Ok(parts.map(|(((from, to), outline), reflectance)| Element {
             patch,
@@ -365,7 +386,10 @@ impl<'a> Input<'a> {
         let light = self.u32()?;
         let share = self.rgb()?;
         let (first_element, element_count) = (self.u32()?, self.u32()?);
-        let is_legal = share.is_legal() && (light == NO_LIGHT || (light as usize) < lights);
+        let is_legal = match light {
+            NO_LIGHT => share == Rgb::BLACK,
+            _ => share.is_legal() && (light as usize) < lights,
+        };
         let outline = surfaces.get(surface as usize).filter(|_| is_legal);
         Ok(outline.zip(side).map(|(outline, side)| Face {
             surface,
@@ -435,6 +459,57 @@ mod tests {
             let mut damaged = bytes.clone();
             damaged[at] ^= 0x55;
             assert!(read(&damaged).is_err(), "byte {at}");
+        }
+    }
+
+    /// Changes at the offsets that the format documents, with a right checksum.
+    #[test]
+    fn what_the_format_does_not_allow_is_an_error() {
+        let solution = sample(false);
+        let sound = write(&solution);
+        let surfaces = solution.surfaces.iter();
+        let faces = 44 + surfaces.map(|s| 4 + 12 * s.vertices().len()).sum::<usize>();
+        let patches = faces + 32 * solution.mesh.faces.len();
+        let elements = patches + 20 * solution.mesh.patches.len();
+        let lights = elements + 32 * solution.mesh.elements.len();
+        let first = solution.mesh.faces[0];
+        let last_element = first.element_count as usize - 1;
+        let last_patch = solution.mesh.patches.len() as u32 - 1;
+        let black = solution
+            .mesh
+            .faces
+            .iter()
+            .position(|f| f.emission.is_none());
+        let unlit = faces + 32 * black.unwrap();
+        for (at, value, what, index) in [
+            (10, [2, 0, 0, 0], "flags", 2),
+            (faces, [200, 0, 0, 0], "faces", 0),
+            (faces + 4, [2, 0, 0, 0], "faces", 0),
+            (faces + 24, [1, 0, 0, 0], "faces", 0),
+            (faces + 32, first.surface.to_le_bytes(), "faces", 1),
+            (unlit + 12, 1_f32.to_le_bytes(), "faces", black.unwrap()),
+            (patches, [1, 0, 0, 0], "patches", 1),
+            (patches + 4, 2_f32.to_le_bytes(), "patches", 0),
+            (
+                elements + 32 * last_element,
+                last_patch.to_le_bytes(),
+                "elements",
+                last_element,
+            ),
+            (elements + 20, 1_f32.to_le_bytes(), "elements", 0),
+            (lights + 4, [0xff; 4], "lights", 0),
+        ] {
+            let mut forged = sound.clone();
+            let width = if at == 10 { 2 } else { 4 };
+            forged[at..at + width].copy_from_slice(&value[..width]);
+            let end = forged.len() - 4;
+            let sum = CRC.checksum(&forged[..end]);
+            forged[end..].copy_from_slice(&sum.to_le_bytes());
+            assert_eq!(
+                read(&forged),
+                Err(FileError::Illegal { what, index }),
+                "byte {at}: {value:?}"
+            );
         }
     }
 }

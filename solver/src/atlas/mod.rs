@@ -17,12 +17,13 @@
 //! | 32 | `u32` length of the names |
 //! | 36 | `u32` surfaces, 0 without a mesh |
 //! | 40 | `u32` faces, 0 without a mesh |
-//! | 44 | four zero bytes |
-//! | 48 | `k` lights of 20: nominal emission `3 f32`, scale mantissa `u16`, scale exponent `i16`, length of the name `u16`, two zero bytes |
+//! | 44 | `f32` largest error of packing, see [`WorstError::packed`]; all ones: not measured |
+//! | 48 | `f32` the same of what is shown, see [`WorstError::shown`] |
+//! | 52 | `k` lights of 24: nominal emission `3 f32`, scale mantissa `u16`, scale exponent `i16`, length of the name `u16`, two zero bytes, largest error with this light alone `f32` (all ones: not measured) |
 //! | | the names one after the other, UTF-8 |
 //! | | codes: `n` elements of `k` lights of 1 or 3 bytes |
 //! | | with a mesh, surfaces of 52: four vertices `3 f32` (a triangle repeats its third), vertex count `u32` |
-//! | | faces of 24: surface `u32`, side `u32` (0 front, 1 back), light `u32` (all ones: none), share `3 f32` |
+//! | | faces of 24: surface `u32`, side `u32` (0 front, 1 back), light `u32` (all ones: none), share `3 f32` (without a light: 0) |
 //! | | elements of 32: face `u32`, parameter corners `from`, `to` `4 f32`, reflectance `3 f32` |
 //!
 //! A code is the exponential code ([`crate::code`]) of the contribution over the light's scale.
@@ -48,14 +49,16 @@ use crate::scene::Emission;
 /// How an atlas starts.
 pub const MAGIC: [u8; 8] = *b"RELUMEAT";
 const VERSION: u16 = 1;
-const HEADER_BYTES: usize = 48;
+const HEADER_BYTES: usize = 52;
 const CHECKSUM_AT: usize = 20;
-const LIGHT_BYTES: usize = 20;
+const LIGHT_BYTES: usize = 24;
 const SURFACE_BYTES: usize = 52;
 const FACE_BYTES: usize = 24;
 const ELEMENT_BYTES: usize = 32;
 /// Light of a face that emits nothing.
 const NO_LIGHT: u32 = u32::MAX;
+/// Bits of an error that nobody measured; a NaN, so no error has them.
+const NOT_MEASURED: u32 = u32::MAX;
 
 /// What one code stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,7 +89,19 @@ pub enum Quantity {
     Radiosity,
 }
 
-/// Name, nominal emission and scale of a light, as read.
+/// The largest errors of packing over all states of the lights that were tried.
+///
+/// In display codes: steps of 8-bit sRGB, at the exposure that puts the 98th percentile of the exact
+/// state's luminance at white; finite and not negative.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WorstError {
+    /// Of what is packed, the atlas's [`Quantity`].
+    pub packed: f32,
+    /// Of what is shown, emission plus reflectance times irradiance.
+    pub shown: f32,
+}
+
+/// Name, nominal emission, scale and error of a light, as read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AtlasLight<'a> {
     /// Its name.
@@ -95,6 +110,9 @@ pub struct AtlasLight<'a> {
     pub emission: Rgb,
     /// What one unit of the code is worth, at unit emission.
     pub scale: Scale,
+    /// Largest error with this light alone, in display codes as in [`WorstError::packed`]; `None`
+    /// when nobody measured it.
+    pub error: Option<f32>,
 }
 
 /// One side of a surface, as read.
@@ -145,6 +163,8 @@ pub enum AtlasError {
     Checksum,
     /// This part of the atlas holds an illegal value.
     Illegal(&'static str),
+    /// This is more than the format holds; what it is, and what to do.
+    Unfit(&'static str),
     /// The slice to write into is too short.
     Full {
         /// Bytes that are needed.
@@ -155,19 +175,30 @@ pub enum AtlasError {
 impl fmt::Display for AtlasError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NotAnAtlas => f.write_str("these bytes are not an atlas"),
+            Self::NotAnAtlas => {
+                f.write_str("these bytes are not an atlas; make one with `relume pack`")
+            }
             Self::Version(version) => write!(
                 f,
                 "atlas version {version} is not the {VERSION} known here; update relume or pack again"
             ),
             Self::Truncated { needed } => {
-                write!(f, "the atlas is cut off: {needed} bytes are needed")
+                write!(
+                    f,
+                    "the atlas is cut off, {needed} bytes are needed; copy or pack it again"
+                )
             }
             Self::Oversized { needed } => {
-                write!(f, "the atlas ends after {needed} bytes, but more follow")
+                write!(
+                    f,
+                    "the atlas ends after {needed} bytes, but more follow; copy or pack it again"
+                )
             }
-            Self::Checksum => f.write_str("the checksum does not match: the atlas was damaged"),
-            Self::Illegal(what) => write!(f, "the atlas holds an illegal {what}"),
+            Self::Checksum => f.write_str(
+                "the checksum does not match: the atlas was damaged; copy or pack it again",
+            ),
+            Self::Illegal(what) => write!(f, "the atlas holds an illegal {what}; pack it again"),
+            Self::Unfit(what) => write!(f, "an atlas cannot hold {what}"),
             Self::Full { needed } => write!(f, "the atlas needs {needed} bytes of room"),
         }
     }

@@ -4,8 +4,8 @@ use glam::{Vec2, Vec3};
 
 use super::{
     AtlasElement, AtlasError, AtlasFace, AtlasLight, CHECKSUM_AT, Channels, CountsOf,
-    ELEMENT_BYTES, FACE_BYTES, HEADER_BYTES, LIGHT_BYTES, MAGIC, NO_LIGHT, Quantity, SURFACE_BYTES,
-    VERSION, checksum,
+    ELEMENT_BYTES, FACE_BYTES, HEADER_BYTES, LIGHT_BYTES, MAGIC, NO_LIGHT, NOT_MEASURED, Quantity,
+    SURFACE_BYTES, VERSION, WorstError, checksum,
 };
 use crate::code::{Code, Scale};
 use crate::color::{Reflectance, Rgb};
@@ -19,6 +19,7 @@ pub struct Atlas<'a> {
     code: Code,
     quantity: Quantity,
     counts: CountsOf,
+    worst_error: Option<WorstError>,
     lights: &'a [u8],
     names: &'a str,
     codes: &'a [u8],
@@ -53,6 +54,7 @@ impl<'a> Atlas<'a> {
             code: header.code,
             quantity: header.quantity,
             counts,
+            worst_error: header.worst_error,
             lights: part(HEADER_BYTES as u64, needed.names),
             names: names.map_err(|_| AtlasError::Illegal("light name"))?,
             codes: part(needed.codes, needed.surfaces),
@@ -74,6 +76,9 @@ impl<'a> Atlas<'a> {
         for tag in 0..self.counts.lights {
             let record = LightRecord::parse(record(self.lights, tag, LIGHT_BYTES));
             let record = record.ok_or(AtlasError::Illegal("light"))?;
+            if record.error.is_some() != self.worst_error.is_some() {
+                return Err(AtlasError::Illegal("error of a light"));
+            }
             let end = named + usize::from(record.name_length);
             if self.names.get(named..end).is_none() {
                 return Err(AtlasError::Illegal("light name"));
@@ -105,6 +110,12 @@ impl<'a> Atlas<'a> {
         self.quantity
     }
 
+    /// What packing cost, over all states that were tried; `None` when nobody measured it.
+    #[must_use]
+    pub const fn worst_error(&self) -> Option<WorstError> {
+        self.worst_error
+    }
+
     /// How many elements there are.
     #[must_use]
     pub const fn element_count(&self) -> u32 {
@@ -128,6 +139,7 @@ impl<'a> Atlas<'a> {
                 name,
                 emission: record.emission,
                 scale: record.scale,
+                error: record.error,
             })
         })
     }
@@ -229,6 +241,9 @@ impl AtlasMesh<'_> {
         };
         let light = input.u32()?;
         let share = input.rgb().filter(|share| share.is_legal())?;
+        if light == NO_LIGHT && share != Rgb::BLACK {
+            return None;
+        }
         Some(AtlasFace {
             surface,
             side,
@@ -262,6 +277,7 @@ struct Header {
     length: u32,
     checksum: u32,
     counts: CountsOf,
+    worst_error: Option<WorstError>,
 }
 
 impl Header {
@@ -277,7 +293,10 @@ impl Header {
         if version != VERSION {
             return Err(AtlasError::Version(version));
         }
-        let [code, channels, quantity, ..] = input.take::<6>().ok_or(short)?;
+        let [code, channels, quantity, reserved @ ..] = input.take::<6>().ok_or(short)?;
+        if reserved != [0; 3] {
+            return Err(AtlasError::Illegal("reserved byte"));
+        }
         let code = Code::ALL.get(usize::from(code));
         debug_assert_eq!(CHECKSUM_AT, 20);
         let words = input.take::<{ HEADER_BYTES - 16 }>().ok_or(short)?;
@@ -305,7 +324,22 @@ impl Header {
                 surfaces: next()?,
                 faces: next()?,
             },
+            worst_error: match (error(next()?), error(next()?)) {
+                (Some(Some(packed)), Some(Some(shown))) => Some(WorstError { packed, shown }),
+                (Some(None), Some(None)) => None,
+                _ => return Err(AtlasError::Illegal("error")),
+            },
         })
+    }
+}
+
+/// An error from its bits, `None` inside when nobody measured it; `None` outside when it is illegal.
+fn error(bits: u32) -> Option<Option<f32>> {
+    let error = f32::from_bits(bits);
+    match bits {
+        NOT_MEASURED => Some(None),
+        _ if error.is_finite() && error >= 0.0 => Some(Some(error)),
+        _ => None,
     }
 }
 
@@ -313,15 +347,21 @@ struct LightRecord {
     emission: Rgb,
     scale: Scale,
     name_length: u16,
+    error: Option<f32>,
 }
 
 impl LightRecord {
     fn parse(bytes: &[u8]) -> Option<Self> {
         let mut input = Input(bytes);
+        let emission = input.rgb().filter(|emission| emission.is_legal())?;
+        let scale = Scale::from_parts(input.u16()?, i16::from_le_bytes(input.take()?))?;
+        let name_length = input.u16()?;
+        input.u16().filter(|reserved| *reserved == 0)?;
         Some(Self {
-            emission: input.rgb().filter(|emission| emission.is_legal())?,
-            scale: Scale::from_parts(input.u16()?, i16::from_le_bytes(input.take()?))?,
-            name_length: input.u16()?,
+            emission,
+            scale,
+            name_length,
+            error: error(input.u32()?)?,
         })
     }
 }

@@ -16,6 +16,11 @@ const SQUARE: [Vec3; 4] = [
     Vec3::new(0.0, 1.0, 0.0),
 ];
 
+const WORST: WorstError = WorstError {
+    packed: 2.75,
+    shown: 1.25,
+};
+
 fn value(element: u32, light: u32) -> Rgb {
     let base = 0.01 + 0.1 * element as f32 + light as f32;
     Rgb::new(base, base * 0.5, base * 0.25)
@@ -52,6 +57,7 @@ fn sample() -> Vec<u8> {
         quantity: Quantity::Irradiance,
         lights: &[entry("ceiling", 1.0), entry("Lämpchen", 2.0)],
         elements: 8,
+        errors: Some((WORST, &[0.5, 2.5])),
         mesh: Some((&surfaces.map(|s| *s.polygon()), mesh)),
     };
     let mut bytes = vec![0; size(&contents).unwrap()];
@@ -73,6 +79,9 @@ fn what_was_written_is_read() {
     let names: Vec<&str> = atlas.lights().map(|light| light.name).collect();
     assert_eq!(names, ["ceiling", "Lämpchen"]);
     assert_eq!((atlas.element_count(), atlas.light_count()), (8, 2));
+    let errors: Vec<_> = atlas.lights().map(|light| light.error).collect();
+    assert_eq!(errors, [Some(0.5), Some(2.5)]);
+    assert_eq!(atlas.worst_error(), Some(WORST));
 
     for element in 0..8 {
         let (triples, rest) = atlas.codes(element).as_chunks::<3>();
@@ -139,9 +148,61 @@ fn resign(bytes: &mut [u8]) {
     }
 }
 
+/// Changes to a legal atlas at the offsets that the format documents, with a right checksum.
+#[test]
+fn what_the_format_does_not_allow_is_an_error() {
+    let sound = sample();
+    let names = "ceilingLämpchen".len();
+    let surfaces = 52 + 2 * 24 + names + 8 * 2 * 3;
+    let faces = surfaces + 2 * 52;
+    let elements = faces + 3 * 24;
+    assert_eq!(sound.len(), elements + 8 * 32);
+    let nan = f32::NAN.to_le_bytes();
+    let minus = (-1.0_f32).to_le_bytes();
+    for (at, bytes, what) in [
+        (10, &[9][..], "code"),
+        (11, &[2], "number of channels"),
+        (12, &[2], "quantity"),
+        (13, &[1], "reserved byte"),
+        (15, &[1], "reserved byte"),
+        (16, &[0], "length"),
+        (44, &nan, "error"),
+        (44, &minus, "error"),
+        (48, &[0xff; 4], "error"),
+        (44, &[0xff; 8], "error of a light"),
+        (52, &minus, "light"),
+        (52 + 16, &[0], "light name"),
+        (52 + 18, &[1], "light"),
+        (52 + 19, &[1], "light"),
+        (52 + 20, &nan, "light"),
+        (52 + 20, &[0xff; 4], "error of a light"),
+        (52 + 2 * 24, &[0xff], "light name"),
+        (surfaces, &nan, "surface"),
+        (surfaces + 48, &[5], "surface"),
+        (faces, &[2], "face"),
+        (faces + 4, &[2], "face"),
+        (faces + 12, &1_f32.to_le_bytes(), "face"),
+        (faces + 2 * 24 + 8, &[2], "light of a face"),
+        (elements, &[1], "face of an element"),
+        (elements + 7 * 32, &[3], "face of an element"),
+        (elements + 4, &minus, "element"),
+        (elements + 20, &1_f32.to_le_bytes(), "element"),
+    ] {
+        let mut forged = sound.clone();
+        forged[at..at + bytes.len()].copy_from_slice(bytes);
+        resign(&mut forged);
+        let found = Atlas::parse(&forged).err();
+        assert_eq!(
+            found,
+            Some(AtlasError::Illegal(what)),
+            "byte {at}: {bytes:?}"
+        );
+    }
+}
+
 proptest! {
     #[test]
-    fn forged_atlases_never_panic(at in 0_usize..600, value: u8, also in 8_usize..48, byte: u8) {
+    fn forged_atlases_never_panic(at in 0_usize..600, value: u8, also in 8_usize..52, byte: u8) {
         let mut bytes = sample();
         let at = at % bytes.len();
         bytes[at] = value;
@@ -171,6 +232,7 @@ fn an_atlas_without_a_mesh_has_none() {
             scale: Scale::ONE,
         }],
         elements: 3,
+        errors: None,
         mesh: None,
     };
     let mut bytes = vec![0; size(&contents).unwrap()];
@@ -179,4 +241,6 @@ fn an_atlas_without_a_mesh_has_none() {
     assert!(atlas.mesh().is_none());
     assert_eq!(atlas.all_codes().len(), 3);
     assert_eq!(atlas.quantity(), Quantity::Radiosity);
+    assert_eq!(atlas.worst_error(), None);
+    assert_eq!(atlas.lights().next().unwrap().error, None);
 }

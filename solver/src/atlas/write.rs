@@ -1,8 +1,8 @@
 //! Writes an atlas into the caller's slice.
 
 use super::{
-    AtlasError, CHECKSUM_AT, Channels, CountsOf, HEADER_BYTES, MAGIC, NO_LIGHT, Quantity, VERSION,
-    checksum,
+    AtlasError, CHECKSUM_AT, Channels, CountsOf, HEADER_BYTES, MAGIC, NO_LIGHT, NOT_MEASURED,
+    Quantity, VERSION, WorstError, checksum,
 };
 use crate::code::{Code, Scale, encode};
 use crate::color::Rgb;
@@ -33,13 +33,16 @@ pub struct Contents<'a> {
     pub lights: &'a [LightEntry<'a>],
     /// How many elements there are.
     pub elements: u32,
+    /// What packing cost: the worst, and that of every light alone (see
+    /// [`AtlasLight::error`](super::AtlasLight::error)); `None` when nobody measured it.
+    pub errors: Option<(WorstError, &'a [f32])>,
     /// Outlines of all surfaces and the mesh, for drawing and probing by place; `None` saves their bytes.
     pub mesh: Option<(&'a [Polygon], Mesh<'a>)>,
 }
 
 impl Contents<'_> {
     fn counts(&self) -> Result<CountsOf, AtlasError> {
-        let count = |n: usize, what| u32::try_from(n).map_err(|_| AtlasError::Illegal(what));
+        let count = |n: usize, what| u32::try_from(n).map_err(|_| AtlasError::Unfit(what));
         let names = self.lights.iter().map(|light| light.name.len()).sum();
         let (surfaces, faces) = self
             .mesh
@@ -47,15 +50,21 @@ impl Contents<'_> {
         if let Some((_, mesh)) = self.mesh
             && mesh.elements.len() != self.elements as usize
         {
-            return Err(AtlasError::Illegal("number of elements"));
+            return Err(AtlasError::Unfit("another mesh than that of its elements"));
+        }
+        if self
+            .errors
+            .is_some_and(|(_, e)| e.len() != self.lights.len())
+        {
+            return Err(AtlasError::Unfit("errors of other lights than its own"));
         }
         Ok(CountsOf {
             channels: self.channels,
             elements: self.elements,
-            lights: count(self.lights.len(), "number of lights")?,
-            names: count(names, "length of names")?,
-            surfaces: count(surfaces, "number of surfaces")?,
-            faces: count(faces, "number of faces")?,
+            lights: count(self.lights.len(), "2^32 lights; use fewer")?,
+            names: count(names, "names of 4 GiB; shorten them")?,
+            surfaces: count(surfaces, "2^32 surfaces; use fewer")?,
+            faces: count(faces, "2^32 faces; use fewer")?,
         })
     }
 }
@@ -63,21 +72,23 @@ impl Contents<'_> {
 /// Bytes that [`write()`] needs.
 ///
 /// # Errors
-/// [`AtlasError::Illegal`] for counts that the format cannot hold.
+/// [`AtlasError::Unfit`] for counts that the format cannot hold.
 pub fn size(contents: &Contents) -> Result<usize, AtlasError> {
     let layout = contents.counts()?.layout();
     layout
         .filter(|layout| layout.end <= u64::from(u32::MAX))
         .and_then(|layout| usize::try_from(layout.end).ok())
-        .ok_or(AtlasError::Illegal("size of more than 4 GiB"))
+        .ok_or(AtlasError::Unfit(
+            "more than 4 GiB; use longer elements or fewer lights",
+        ))
 }
 
 /// Writes an atlas to the start of `out`; `contribution(element, light)` is in W/m2 at unit
 /// emission. Returns its length.
 ///
 /// # Errors
-/// [`AtlasError::Full`] when `out` is too short, [`AtlasError::Illegal`] for counts, names or
-/// emissions that the format cannot hold; `out` then holds nothing of use.
+/// [`AtlasError::Full`] when `out` is too short, [`AtlasError::Unfit`] for counts, names, emissions
+/// or errors that the format cannot hold; `out` then holds nothing of use.
 pub fn write(
     contents: &Contents,
     contribution: impl Fn(u32, u32) -> Rgb,
@@ -87,7 +98,7 @@ pub fn write(
     let bytes = out.get_mut(..needed).ok_or(AtlasError::Full { needed })?;
     let mut output = Output { rest: bytes };
     header(contents, needed, &mut output)?;
-    lights(contents.lights, &mut output)?;
+    lights(contents, &mut output)?;
     for element in 0..contents.elements {
         for (light, tag) in contents.lights.iter().zip(0..) {
             let value = contribution(element, tag) * light.scale.value().recip();
@@ -130,6 +141,7 @@ fn header(contents: &Contents, length: usize, output: &mut Output) -> Result<(),
         0,
         0,
     ])?;
+    let worst = contents.errors.map(|(worst, _)| worst);
     // `size` has checked that the length fits; the checksum is filled in at the end.
     let rest = [
         length as u32,
@@ -139,24 +151,41 @@ fn header(contents: &Contents, length: usize, output: &mut Output) -> Result<(),
         counts.names,
         counts.surfaces,
         counts.faces,
-        0,
+        error_bits(worst.map(|worst| worst.packed))?,
+        error_bits(worst.map(|worst| worst.shown))?,
     ];
     debug_assert_eq!(HEADER_BYTES, 16 + 4 * rest.len());
     rest.iter().try_for_each(|value| output.u32(*value))
 }
 
-fn lights(lights: &[LightEntry], output: &mut Output) -> Result<(), AtlasError> {
-    for light in lights {
+fn error_bits(error: Option<f32>) -> Result<u32, AtlasError> {
+    match error {
+        None => Ok(NOT_MEASURED),
+        Some(error) if error.is_finite() && error >= 0.0 => Ok(error.to_bits()),
+        Some(_) => Err(AtlasError::Unfit(
+            "an error that is negative or not finite; measure it again",
+        )),
+    }
+}
+
+fn lights(contents: &Contents, output: &mut Output) -> Result<(), AtlasError> {
+    let lights = contents.lights;
+    for (light, tag) in lights.iter().zip(0..) {
         if !light.emission.is_legal() {
-            return Err(AtlasError::Illegal("nominal emission"));
+            return Err(AtlasError::Unfit(
+                "an emission that is negative or not finite; correct it",
+            ));
         }
-        let length = u16::try_from(light.name.len());
-        let length = length.map_err(|_| AtlasError::Illegal("light name of over 65535 bytes"))?;
+        let length = u16::try_from(light.name.len()).map_err(|_| {
+            AtlasError::Unfit("the name of a light of more than 65535 bytes; shorten it")
+        })?;
+        let error = contents.errors.and_then(|(_, errors)| errors.get(tag));
         output.rgb(light.emission)?;
         output.put(&light.scale.mantissa().to_le_bytes())?;
         output.put(&light.scale.exponent().to_le_bytes())?;
         output.put(&length.to_le_bytes())?;
         output.put(&[0, 0])?;
+        output.u32(error_bits(error.copied())?)?;
     }
     lights
         .iter()
@@ -185,7 +214,9 @@ fn mesh_parts(surfaces: &[Polygon], mesh: Mesh, output: &mut Output) -> Result<(
         let patch = mesh.patches.get(element.patch as usize);
         output.u32(
             patch
-                .ok_or(AtlasError::Illegal("patch of an element"))?
+                .ok_or(AtlasError::Unfit(
+                    "an element without a patch; mesh it again",
+                ))?
                 .face,
         )?;
         output.f32s(&element.from.to_array())?;

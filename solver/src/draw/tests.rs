@@ -50,6 +50,7 @@ fn atlas() -> Vec<u8> {
             scale: Scale::ONE,
         }],
         elements: 2,
+        errors: None,
         mesh: Some((&surfaces.map(|s| *s.polygon()), storage.mesh())),
     };
     let mut bytes = vec![0; size(&contents).unwrap()];

@@ -148,6 +148,33 @@ mod tests {
     }
 
     #[test]
+    fn directions_of_any_length_become_unit_vectors() {
+        let sun = |direction| {
+            Luminaire::new(
+                0,
+                Rgb::WHITE,
+                Source::Sun {
+                    direction,
+                    angle: 0.0,
+                },
+            )
+        };
+        for length in [1e-44, 1e-25, 1.0, 1e25, 1e38_f32] {
+            let along = Vec3::new(0.0, 0.0, -length);
+            assert_eq!(
+                *sun(along).unwrap().source(),
+                Source::Sun {
+                    direction: -Vec3::Z,
+                    angle: 0.0
+                },
+                "{length}"
+            );
+        }
+        assert_eq!(sun(Vec3::ZERO), Err(LuminaireError::NoDirection));
+        assert_eq!(sun(Vec3::INFINITY), Err(LuminaireError::NotFinite));
+    }
+
+    #[test]
     fn a_tag_out_of_range_is_named() {
         let lamp = Surface::new(0, &TRIANGLE, Rgb::BLACK)
             .and_then(|s| {

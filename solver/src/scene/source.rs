@@ -162,7 +162,11 @@ fn finite(v: Vec3) -> Result<Vec3, LuminaireError> {
 }
 
 fn unit(direction: Vec3) -> Result<Vec3, LuminaireError> {
-    finite(direction)?
+    let direction = finite(direction)?;
+    // The square of a very long or very short vector leaves the range of f32.
+    let scaled = || (direction / direction.abs().max_element()).try_normalize();
+    direction
         .try_normalize()
+        .or_else(scaled)
         .ok_or(LuminaireError::NoDirection)
 }
