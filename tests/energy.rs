@@ -7,7 +7,7 @@ use glam::Vec3;
 use relume::color::Rgb;
 use relume::form_factor;
 use relume::scene::{Emission, Luminaire, Source, Surface};
-use relume_host::bake::Settings;
+use relume_host::bake::{Method, Settings};
 use relume_host::builtin::{cornell_box, furnace_with_box, white_furnace};
 use relume_host::bvh::Bvh;
 use relume_host::scene::{Light, OwnedScene};
@@ -276,23 +276,28 @@ fn luminaires_balance_too() {
 #[test]
 fn threads_and_the_device_give_the_same_bits() {
     let scene = cornell_box().expect("legal");
-    let settings = Settings {
-        patch: Some(0.2),
-        element: Some(0.05),
-        split_direct: true,
-        ..Settings::default()
+    let bytes = |threads: usize, method: Method| {
+        let settings = Settings {
+            patch: Some(0.2),
+            element: Some(0.05),
+            split_direct: true,
+            method,
+            ..Settings::default()
+        };
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let baked = pool
+            .expect("threads")
+            .install(|| baked(&scene.scene, &settings));
+        relume_host::solution::write(&baked)
     };
-    let with_threads = |count: usize, settings: &Settings| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build();
-        pool.expect("threads")
-            .install(|| baked(&scene.scene, settings))
-    };
-    let one = with_threads(1, &settings);
-    assert_eq!(one, with_threads(2, &settings));
-    assert_eq!(one, with_threads(5, &settings));
-    let device = Settings {
-        method: relume_host::bake::Method::Device,
-        ..settings
-    };
-    assert_eq!(one, with_threads(1, &device));
+    for method in [Method::Gather, Method::Rows] {
+        let one = bytes(1, method);
+        for threads in [2, 5] {
+            assert!(
+                one == bytes(threads, method),
+                "{method:?}, {threads} threads"
+            );
+        }
+    }
+    assert!(bytes(1, Method::Rows) == bytes(1, Method::Device), "device");
 }

@@ -155,7 +155,7 @@ fn without_arguments_the_cornell_box_lands_in_out() {
     assert_eq!(report["solution_bytes"], size("out/cornell.solution"));
     assert_eq!(report["atlas_bytes"], size("out/cornell.atlas"));
     let codes = report["max_error_codes"].as_f64().unwrap();
-    assert!(codes > 0.0 && codes < 10.0, "{codes} display codes");
+    assert!(codes > 0.0 && codes < 20.0, "{codes} display codes");
 
     // All files that it lists are there, and no others.
     let listed = report["files"].as_array().unwrap().iter();
@@ -228,7 +228,8 @@ fn an_obj_and_a_glb_of_one_room_give_the_same_light() {
     let folder = with_scene();
     folder.write("bulb.toml", BULB);
     folder.write("room.glb", room::glb());
-    let options = format!("{MESH} --residual 1e-6");
+    // Rays would start elsewhere in quads that are put together in another order.
+    let options = format!("{MESH} --residual 1e-6 --method rows");
     let obj = folder.json(&format!(
         "bake room.obj --lights bulb.toml -o obj {options}"
     ));
@@ -278,7 +279,7 @@ fn a_light_file_changes_nominal_emissions_and_nothing_else() {
 fn fewer_shots_leave_a_larger_residual() {
     let folder = with_scene();
     let bake = |options: &str| {
-        let report = folder.json(&format!("bake room.obj {MESH} {options}"));
+        let report = folder.json(&format!("bake room.obj {MESH} --method rows {options}"));
         assert_eq!(report["interrupted"], false);
         let shots = report["shots"].as_u64().unwrap();
         (shots, report["residual"].as_f64().unwrap())
@@ -587,16 +588,18 @@ fn threads_and_method_do_not_change_a_byte() {
     folder.write("bulb.toml", BULB);
     let bake = |options: &str, method: &str| {
         let bake = "bake room.obj --lights bulb.toml -o x";
-        let report = folder.json(&format!("{bake} {MESH} {options}"));
+        let report = folder.json(&format!("{bake} {MESH} {options} --method {method}"));
         assert_eq!(report["method"], method);
         folder.read("x")
     };
-    let expected = bake("", "host");
-    for threads in [1, 2, 7] {
-        let found = bake(&format!("--threads {threads}"), "host");
-        assert!(found == expected, "--threads {threads}");
+    for method in ["gather", "rows"] {
+        let expected = bake("", method);
+        for threads in [1, 2, 7] {
+            let found = bake(&format!("--threads {threads}"), method);
+            assert!(found == expected, "--method {method} --threads {threads}");
+        }
     }
-    assert!(bake("--method device", "device") == expected);
+    assert!(bake("", "device") == bake("", "rows"));
 }
 
 #[test]
@@ -627,12 +630,21 @@ fn an_interrupted_bake_is_byte_for_byte_what_its_shots_give() {
     use std::process::{Command, Stdio};
     use std::time::Instant;
 
+    for method in ["gather", "rows"] {
+        interrupt_until_it_counts(&format!("bake room.obj --element 0.1 --method {method}"));
+    }
+}
+
+/// Interrupts a bake of 6000 elements until the signal comes between the first row and the last.
+#[cfg(unix)]
+fn interrupt_until_it_counts(bake: &str) {
+    use std::process::{Command, Stdio};
+    use std::time::Instant;
+
     let folder = with_scene();
-    let bake = "bake room.obj --element 0.1"; // 6000 elements, 370 rows
     let start = Instant::now();
-    folder.done(&format!("{bake} -o whole"));
-    // Late enough that known rows are shot again between new ones. How fast the machine is at any
-    // time does not matter: after a signal that came too early or too late, there is another.
+    let whole = folder.json(&format!("{bake} -o whole"));
+    // How fast the machine is at any time does not matter: after a signal that came too early or too late, there is another.
     let mut patience = start.elapsed().mul_f32(0.6);
     for _ in 0..20 {
         let mut command = folder.command(&format!("{bake} -o part --json"));
@@ -648,12 +660,11 @@ fn an_interrupted_bake_is_byte_for_byte_what_its_shots_give() {
             Some(130) => {
                 let report = command::one_object(&output.stdout);
                 let shots = report["shots"].as_u64().unwrap();
-                let patches = report["patches"].as_u64().unwrap();
                 assert_eq!(report["interrupted"], true);
+                assert!(shots < whole["shots"].as_u64().unwrap(), "{report}");
                 let told = format!("--shots {shots} ");
                 assert!(stderr.contains(&told), "{stderr}");
-                assert!(shots < patches, "{report}");
-                if shots > patches / 4 {
+                if shots > 8 {
                     folder.done(&format!("{bake} -o told --shots {shots}"));
                     let part = folder.read("part");
                     let is_told = part == folder.read("told");

@@ -294,6 +294,8 @@ fn a_published_binary_and_its_obj_give_the_same_light() {
             text(&scene),
             "--element",
             "60",
+            "--method",
+            "rows",
             "-o",
             text(&solution),
         ]);
@@ -305,7 +307,8 @@ fn a_published_binary_and_its_obj_give_the_same_light() {
         let expected = &from_object[&(point, "light_ceil".to_owned())];
         for (found, expected) in found.into_iter().zip(expected) {
             assert!(
-                (found - expected).abs() <= 1e-5 * expected,
+                // 1e-8: rounding of form factors that sum to one.
+                (found - expected).abs() <= 1e-5 * expected + 1e-8,
                 "point {point}: {found} and {expected}"
             );
         }

@@ -80,7 +80,7 @@ impl<'a> Rays<'a> {
         })
     }
 
-    fn from_polygon(&self, polygon: &Polygon, seed: u64, index: u32) -> u32 {
+    fn cast_from(&self, polygon: &Polygon, seed: u64, index: u32) -> u32 {
         let [s, t, u, v] = sequence(index, shift(seed));
         let (point, _) = from_unit_square(polygon, Vec2::new(s, t));
         let element = self.element(point, cosine_direction(polygon.normal(), u, v));
@@ -143,7 +143,7 @@ impl Hits {
                     return;
                 };
                 for (hit, index) in hits.iter_mut().zip(first..) {
-                    *hit = rays.from_polygon(&polygon, id as u64, index);
+                    *hit = rays.cast_from(&polygon, id as u64, index);
                 }
             });
         self.passes.push(hits);

@@ -333,7 +333,7 @@ mod tests {
         residual: 1e-4,
         shots: None,
         plain: false,
-        noise: 0.1,
+        noise: 1e-9,
         variation: 0.15,
         split_direct: false,
         method: Method::Gather,
