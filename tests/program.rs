@@ -627,9 +627,6 @@ fn a_dash_writes_to_stdout_what_a_file_would_hold() {
 #[cfg(unix)]
 #[test]
 fn an_interrupted_bake_is_byte_for_byte_what_its_shots_give() {
-    use std::process::{Command, Stdio};
-    use std::time::Instant;
-
     for method in ["gather", "rows"] {
         interrupt_until_it_counts(&format!("bake room.obj --element 0.1 --method {method}"));
     }
