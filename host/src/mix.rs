@@ -178,6 +178,7 @@ mod tests {
                 name: name.to_owned(),
                 emission: Rgb::new(2.0, 4.0, 1.0),
                 residual: 0.0,
+                error: 0.0,
             })
             .collect()
     }

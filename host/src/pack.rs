@@ -13,7 +13,7 @@ use thiserror::Error;
 use crate::display_error::{max_codes, test_mixes};
 use crate::mesh::OwnedMesh;
 use crate::picture::white;
-use crate::solution::{Solution, SolutionLight};
+use crate::solution::{Method, Solution, SolutionLight};
 
 /// How to pack.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -185,6 +185,7 @@ pub fn unpack(atlas: &Atlas) -> Solution {
     let (surfaces, mesh) = unpack_mesh(atlas);
     Solution {
         surfaces,
+        luminaires: Vec::new(),
         mesh,
         lights: lights
             .iter()
@@ -192,10 +193,12 @@ pub fn unpack(atlas: &Atlas) -> Solution {
                 name: light.name.to_owned(),
                 emission: light.emission,
                 residual: f32::NAN,
+                error: f32::NAN,
             })
             .collect(),
         contributions,
         direct: None,
+        method: Method::default(),
         rows: 0,
         spacing: Spacing {
             patch: f32::NAN,

@@ -106,7 +106,7 @@ impl RowFiller for Parallel<'_> {
                     return Vec::new();
                 }
                 let margin = ROUNDINGS * largest_coordinate(&[polygon, *receiver]);
-                let shaft = Shaft::with_margin(*receiver, polygon, margin);
+                let shaft = Shaft::with_margin(receiver, &polygon, margin);
                 let narrowed = self.bvh.narrowed(&shaft);
                 let receivers = self.elements[range.clone()].iter();
                 let receivers = receivers.filter_map(|e| mesh.elements.get(*e as usize));

@@ -50,21 +50,30 @@ pub fn irradiance(
 
 /// Irradiance at a point with a unit normal at unit emission, W/m2.
 ///
-/// `far` is a distance at which every surface has been passed, in m.
+/// `far` is a distance at which every surface has been passed, in m; sun and sky are looked at along
+/// `sets` interleaved sets of directions.
 #[must_use]
 pub fn at_point(
     source: &Source,
     position: Vec3,
     normal: Vec3,
     far: f32,
+    sets: u32,
     visibility: &impl Visibility,
 ) -> f32 {
-    let receiver = Receiver {
-        position,
-        normal,
-        offset: offset(0, 1),
+    let sets = match source {
+        Source::Point { .. } | Source::Spot { .. } => 1,
+        Source::Sun { .. } | Source::Sky => sets.max(1),
     };
-    receiver.irradiance(source, far, visibility)
+    let of_set = |index| {
+        let receiver = Receiver {
+            position,
+            normal,
+            offset: offset(index, sets),
+        };
+        receiver.irradiance(source, far, visibility)
+    };
+    (0..sets).map(of_set).sum::<f32>() / sets as f32
 }
 
 /// A point that receives, and where its directions lie in their strata.

@@ -10,7 +10,7 @@
 use glam::{Vec2, Vec3};
 use heapless::Vec;
 
-use crate::geometry::Polygon;
+use crate::geometry::{Plane, Polygon};
 use crate::scene::Surface;
 
 /// Tells who stands between two points or two polygons.
@@ -59,14 +59,17 @@ impl Bounds {
     /// The box of a polygon.
     #[must_use]
     pub fn of(polygon: &Polygon) -> Self {
-        let origin = polygon.origin();
+        Self::around(polygon.origin(), polygon.vertices())
+    }
+
+    fn around(origin: Vec3, points: &[Vec3]) -> Self {
         let nothing = Self {
             low: origin,
             high: origin,
         };
-        polygon.vertices().iter().fold(nothing, |bounds, v| Self {
-            low: bounds.low.min(*v),
-            high: bounds.high.max(*v),
+        points.iter().fold(nothing, |bounds, point| Self {
+            low: bounds.low.min(*point),
+            high: bounds.high.max(*point),
         })
     }
 
@@ -122,11 +125,12 @@ impl Wall {
     }
 }
 
-/// The space in which a surface can stand between two polygons.
+/// The space in which a surface can stand between a receiver and a shooter.
 #[derive(Clone, Debug)]
 pub struct Shaft {
-    receiver: Polygon,
-    shooter: Polygon,
+    planes: [Plane; 2],
+    /// Vertices of both ends.
+    ends: Vec<Vec3, 8>,
     around: Bounds,
     walls: Vec<Wall, 12>,
 }
@@ -134,25 +138,41 @@ pub struct Shaft {
 impl Shaft {
     /// The shaft between two polygons.
     #[must_use]
-    pub fn new(receiver: Polygon, shooter: Polygon) -> Self {
+    pub fn new(receiver: &Polygon, shooter: &Polygon) -> Self {
         Self::with_margin(receiver, shooter, 0.0)
     }
 
     /// A shaft that holds all the shafts between points within `margin` of the two polygons, m.
     #[must_use]
-    pub fn with_margin(receiver: Polygon, shooter: Polygon, margin: f32) -> Self {
+    pub fn with_margin(receiver: &Polygon, shooter: &Polygon, margin: f32) -> Self {
+        Self::between(receiver.plane(), receiver.vertices(), shooter, margin)
+    }
+
+    /// The shaft between a point that faces along a unit normal and a polygon.
+    #[must_use]
+    pub fn from_point(point: Vec3, normal: Vec3, shooter: &Polygon) -> Self {
+        let plane = Plane {
+            origin: point,
+            normal,
+            flatness: 0.0,
+        };
+        Self::between(plane, &[point], shooter, 0.0)
+    }
+
+    fn between(plane: Plane, receiver: &[Vec3], shooter: &Polygon, margin: f32) -> Self {
         let (a, b) = (
-            Bounds::of(&receiver).widened(margin),
-            Bounds::of(&shooter).widened(margin),
+            Bounds::around(plane.origin, receiver).widened(margin),
+            Bounds::of(shooter).widened(margin),
         );
         let walls = [[0, 1], [1, 2], [2, 0]].into_iter().flat_map(|axes| {
             let ends = [[false, false], [false, true], [true, false], [true, true]];
             ends.into_iter()
                 .filter_map(move |end| wall(a, b, axes, end))
         });
+        let ends = receiver.iter().chain(shooter.vertices());
         Self {
-            receiver,
-            shooter,
+            planes: [plane, shooter.plane()],
+            ends: ends.copied().take(8).collect(),
             around: a.with(b),
             walls: walls.collect(),
         }
@@ -164,29 +184,29 @@ impl Shaft {
         !self.around.overlaps(bounds) || self.walls.iter().any(|wall| wall.excludes(bounds))
     }
 
-    /// True when the surface may hide a part of one polygon from a part of the other.
+    /// True when the surface may hide a part of one end from a part of the other.
     #[must_use]
     pub fn admits(&self, surface: &Polygon) -> bool {
-        let in_front = |of: &Polygon| {
+        let is_in_front = |plane: &Plane| {
             surface.vertices().iter().any(|v| {
-                let (height, tolerance) = of.height(*v);
+                let (height, tolerance) = plane.height(*v);
                 height > tolerance
             })
         };
-        let separates = || {
-            let ends = self.receiver.vertices().iter();
-            let (mut above, mut below) = (false, false);
-            for end in ends.chain(self.shooter.vertices()) {
-                let (height, tolerance) = surface.height(*end);
-                above |= height > tolerance;
-                below |= height < -tolerance;
-            }
-            above && below
-        };
         !self.misses(Bounds::of(surface))
-            && in_front(&self.receiver)
-            && in_front(&self.shooter)
-            && separates()
+            && self.planes.iter().all(is_in_front)
+            && self.is_cut_by(&surface.plane())
+    }
+
+    /// True when the ends lie on both sides of a plane.
+    fn is_cut_by(&self, plane: &Plane) -> bool {
+        let (mut above, mut below) = (false, false);
+        for end in &self.ends {
+            let (height, tolerance) = plane.height(*end);
+            above |= height > tolerance;
+            below |= height < -tolerance;
+        }
+        above && below
     }
 }
 

@@ -47,13 +47,14 @@ pub(super) fn gather(job: &mut Job, mesh: OwnedMesh, bvh: &Bvh) -> Result<Solved
         hits.cast(&view, &rays);
         if hits.passes() as u32 == next_look.min(passes) {
             light.bounce(&mesh, &hits, job.settings.residual);
-            if light.noise(&mesh, &hits) <= job.settings.noise {
+            if light.estimate(&mesh, &hits) <= job.settings.noise {
                 break;
             }
             next_look *= 2;
         }
     }
     light.bounce(&mesh, &hits, job.settings.residual);
+    light.estimate(&mesh, &hits);
     Ok(light.solved(lamps.rows + hits.passes() as u32, mesh, job.settings))
 }
 
@@ -76,6 +77,8 @@ struct Block {
     /// Power of lamps that have not been shot, W.
     waiting: [f32; LANES],
     residuals: [f32; LANES],
+    /// Estimated relative L1 errors.
+    errors: [f32; LANES],
 }
 
 impl Light {
@@ -88,6 +91,7 @@ impl Light {
             emitted: [0.0; LANES],
             waiting: [0.0; LANES],
             residuals: [1.0; LANES],
+            errors: [1.0; LANES],
         };
         let mut light = Self {
             lights,
@@ -150,25 +154,32 @@ impl Light {
         residuals.take(self.lights).fold(0.0, f32::max)
     }
 
-    /// Relative L1 error of the worst light by the scatter of the rays.
-    fn noise(&self, mesh: &OwnedMesh, hits: &Hits) -> f32 {
-        let noise = self.blocks.iter().flat_map(|block| {
-            let irradiance = block.irradiance();
-            hits.noise(&mesh.view(), &irradiance)
-        });
-        noise.take(self.lights).fold(0.0, f32::max)
+    /// Estimates the relative L1 error of every light: what the scatter of the rays leaves, and
+    /// what has not been distributed. The largest.
+    fn estimate(&mut self, mesh: &OwnedMesh, hits: &Hits) -> f32 {
+        for block in &mut self.blocks {
+            let noise = hits.noise(&mesh.view(), &block.irradiance());
+            let errors = block.errors.iter_mut().zip(noise).zip(block.residuals);
+            for ((error, noise), residual) in errors {
+                *error = noise + residual;
+            }
+        }
+        let errors = self.blocks.iter().flat_map(|block| block.errors);
+        errors.take(self.lights).fold(0.0, f32::max)
     }
 
     fn solved(self, rows: u32, mesh: OwnedMesh, settings: &Settings) -> Solved {
         let irradiance: Vec<_> = self.blocks.iter().map(Block::irradiance).collect();
         let direct: Vec<_> = self.blocks.iter().map(|b| b.direct.clone()).collect();
         let residuals = self.blocks.iter().flat_map(|block| block.residuals);
+        let errors = self.blocks.iter().flat_map(|block| block.errors);
         Solved {
             contributions: by_element(&irradiance, self.lights),
             direct: settings
                 .split_direct
                 .then(|| by_element(&direct, self.lights)),
             residuals: residuals.take(self.lights).collect(),
+            errors: errors.take(self.lights).collect(),
             rows,
             mesh,
         }

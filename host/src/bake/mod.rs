@@ -23,35 +23,13 @@ use crate::rows::{Parallel, Serial};
 use crate::scene::OwnedScene;
 use crate::solution::{Solution, SolutionLight};
 
+pub use crate::solution::Method;
+
 /// Lanes of a block of lights on the host.
 const LANES: usize = 8;
 
 /// Most bytes of state that a bake takes.
 const STATE_BYTES: usize = 6 << 30;
-
-/// How light gets from element to element.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Method {
-    /// Elements gather what rays bring them, by all threads; lamps shoot rows.
-    #[default]
-    Gather,
-    /// Patches shoot rows of exact form factors, filled by all threads.
-    Rows,
-    /// The solver alone, serially, by brute force: what a device does. Same bits as [`Self::Rows`].
-    Device,
-}
-
-impl Method {
-    /// The name on the command line.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Gather => "gather",
-            Self::Rows => "rows",
-            Self::Device => "device",
-        }
-    }
-}
 
 /// What to bake, how finely, and when to stop.
 #[derive(Clone, Debug)]
@@ -208,7 +186,7 @@ pub fn bake(
         Method::Gather | Method::Rows => shoot::refine(&mut job, mesh, parallel)?,
         Method::Device => shoot::refine(&mut job, mesh, serial)?,
     };
-    Ok(solution(scene, spacing, solved))
+    Ok(solution(scene, settings.method, spacing, solved))
 }
 
 /// What there is to do, and who watches.
@@ -242,6 +220,8 @@ struct Solved {
     direct: Option<Vec<Rgb>>,
     /// One for each light.
     residuals: Vec<f32>,
+    /// Estimated relative L1 error of each light.
+    errors: Vec<f32>,
     rows: u32,
 }
 
@@ -260,20 +240,26 @@ fn check_memory(mesh: &OwnedMesh, lights: usize, settings: &Settings) -> Result<
     Ok(())
 }
 
-fn solution(scene: &OwnedScene, spacing: Spacing, solved: Solved) -> Solution {
-    let lights = scene.lights.iter().zip(solved.residuals);
+fn solution(scene: &OwnedScene, method: Method, spacing: Spacing, solved: Solved) -> Solution {
+    let lights = scene.lights.iter().zip(solved.residuals).zip(solved.errors);
     Solution {
         surfaces: scene.surfaces.iter().map(|s| *s.polygon()).collect(),
+        luminaires: scene.luminaires.clone(),
         mesh: mesh::returned(&solved.mesh, scene),
         lights: lights
-            .map(|(light, residual)| SolutionLight {
+            .map(|((light, residual), error)| SolutionLight {
                 name: light.name.clone(),
                 emission: light.emission,
                 residual,
+                error,
             })
             .collect(),
         contributions: solved.contributions,
         direct: solved.direct,
+        method: match method {
+            Method::Device => Method::Rows,
+            Method::Gather | Method::Rows => method,
+        },
         rows: solved.rows,
         spacing,
     }

@@ -199,6 +199,7 @@ fn read_out(
             .split_direct
             .then(|| collect(&|element, light| refinement.direct(element, light))),
         residuals: (0..lights).map(|l| refinement.light_residual(l)).collect(),
+        errors: (0..lights).map(|l| refinement.light_error(l)).collect(),
         rows: refinement.rows_evaluated(),
         mesh: mesh.clone(),
     }

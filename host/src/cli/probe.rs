@@ -8,7 +8,9 @@ use serde_json::json;
 
 use super::load::{Loaded, load, read};
 use super::{Outcome, keep, output_path, tell, write_file};
-use crate::probe::{Part, ProbeError, Probed, probe_elements, probe_points, read_points};
+use crate::probe::{
+    Part, ProbeError, Probed, probe_elements, probe_gathered, probe_points, read_points,
+};
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -19,6 +21,9 @@ pub struct Arguments {
     /// Direct light only
     #[arg(long)]
     direct: bool,
+    /// Evaluate direct light exactly at the points and gather the indirect there: better than the mesh
+    #[arg(long, requires = "points")]
+    gather: bool,
     /// Where the CSV goes; `-` is stdout
     #[arg(short, long, value_name = "OUT.csv", default_value = "-")]
     output: PathBuf,
@@ -62,7 +67,18 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
         },
         Some(file) => {
             let points = read_points(&read(file)?).with_context(|| file.display().to_string())?;
-            probe_points(solution, &points, part).map_err(named)?
+            if arguments.gather {
+                if !matches!(loaded, Loaded::Solution(_)) {
+                    bail!(
+                        "{}: an atlas does not keep what --gather needs; probe the solution that it \
+                         was packed from",
+                        arguments.input.display()
+                    );
+                }
+                probe_gathered(solution, &points, part).map_err(named)?
+            } else {
+                probe_points(solution, &points, part).map_err(named)?
+            }
         }
     };
     if probed.missing > 0 {

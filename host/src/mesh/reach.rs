@@ -283,7 +283,7 @@ impl<'a> Surroundings<'a> {
     fn is_lit(&self, place: Place, seed: u64) -> bool {
         let Place { position, normal } = place;
         some_of(self.scene.luminaires(), LIGHTS_PER_PLACE, seed).any(|(_, l)| {
-            luminaire::at_point(l.source(), position, normal, self.far, self.bvh) > 0.0
+            luminaire::at_point(l.source(), position, normal, self.far, 1, self.bvh) > 0.0
         }) || (0..GLANCES).any(|glance| {
             let seed = seed + 4 * glance;
             let lamp = pick(&self.lamps, seed).map(|lamp| {

@@ -10,7 +10,8 @@
 //! | faces | `u32` surface, `u32` side (0 front, 1 back), `u32` light (all ones: none), `3 f32` share, `u32` first element, `u32` element count |
 //! | patches | `u32` face, `4 f32` parameter corners |
 //! | elements | `u32` patch, `4 f32` parameter corners, `3 f32` reflectance |
-//! | lights | `u32` length of the name, the name in UTF-8, `3 f32` nominal emission, `f32` residual |
+//! | lights | `u32` length of the name, the name in UTF-8, `3 f32` nominal emission, `f32` residual, `f32` estimated error |
+//! | luminaires | `u32` light, `3 f32` share, `u32` kind (0 point, 1 smooth spot, 2 linear spot, 3 sun, 4 sky), `3 f32` position, `3 f32` direction, `2 f32` angles (inner and outer, or diameter); 0 where the kind has none |
 //! | contributions | `3 f32` per element and light, light inside |
 //! | direct part | likewise, with flag 1 |
 //!
@@ -24,16 +25,22 @@ use glam::{Vec2, Vec3};
 use relume::color::{Reflectance, Rgb};
 use relume::geometry::Polygon;
 use relume::mesh::{Element, Face, Patch, Side, Spacing};
-use relume::scene::Emission;
+use relume::scene::{Emission, Falloff, Luminaire, Source};
 use thiserror::Error;
 
-use super::{Solution, SolutionLight};
+use super::{Method, Solution, SolutionLight};
 use crate::mesh::OwnedMesh;
 
 /// How a solution file starts.
 pub const MAGIC: [u8; 8] = *b"RELUMESO";
 const VERSION: u16 = 1;
 const HAS_DIRECT: u16 = 1;
+const HAS_ROWS: u16 = 2;
+const POINT: u32 = 0;
+const SMOOTH_SPOT: u32 = 1;
+const LINEAR_SPOT: u32 = 2;
+const SUN: u32 = 3;
+const SKY: u32 = 4;
 const NO_LIGHT: u32 = u32::MAX;
 const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
@@ -71,11 +78,13 @@ pub enum FileError {
 pub fn write(solution: &Solution) -> Vec<u8> {
     let mut output = Output(MAGIC.to_vec());
     let mesh = &solution.mesh;
-    let flags = if solution.direct.is_some() {
-        HAS_DIRECT
-    } else {
-        0
-    };
+    let mut flags = 0;
+    if solution.direct.is_some() {
+        flags |= HAS_DIRECT;
+    }
+    if solution.method != Method::Gather {
+        flags |= HAS_ROWS;
+    }
     output.0.extend(VERSION.to_le_bytes());
     output.0.extend(flags.to_le_bytes());
     for count in [
@@ -84,6 +93,7 @@ pub fn write(solution: &Solution) -> Vec<u8> {
         mesh.patches.len(),
         mesh.elements.len(),
         solution.lights.len(),
+        solution.luminaires.len(),
     ] {
         output.u32(count as u32);
     }
@@ -100,7 +110,10 @@ pub fn write(solution: &Solution) -> Vec<u8> {
         output.u32(light.name.len() as u32);
         output.0.extend(light.name.as_bytes());
         output.rgb(light.emission);
-        output.f32s(&[light.residual]);
+        output.f32s(&[light.residual, light.error]);
+    }
+    for luminaire in &solution.luminaires {
+        write_luminaire(luminaire, &mut output);
     }
     for value in solution
         .contributions
@@ -138,6 +151,34 @@ fn write_mesh(mesh: &OwnedMesh, output: &mut Output) {
     }
 }
 
+fn write_luminaire(luminaire: &Luminaire, output: &mut Output) {
+    output.u32(luminaire.light());
+    output.rgb(luminaire.share());
+    let zero = Vec3::ZERO;
+    let (kind, position, direction, angles) = match *luminaire.source() {
+        Source::Point { position } => (POINT, position, zero, [0.0; 2]),
+        Source::Spot {
+            position,
+            direction,
+            inner,
+            outer,
+            falloff,
+        } => {
+            let kind = match falloff {
+                Falloff::Smooth => SMOOTH_SPOT,
+                Falloff::Linear => LINEAR_SPOT,
+            };
+            (kind, position, direction, [inner, outer])
+        }
+        Source::Sun { direction, angle } => (SUN, zero, direction, [angle, 0.0]),
+        Source::Sky => (SKY, zero, zero, [0.0; 2]),
+    };
+    output.u32(kind);
+    output.f32s(&position.to_array());
+    output.f32s(&direction.to_array());
+    output.f32s(&angles);
+}
+
 struct Output(Vec<u8>);
 
 impl Output {
@@ -170,7 +211,7 @@ pub fn read(bytes: &[u8]) -> Result<Solution, FileError> {
         return Err(FileError::Version(version));
     }
     let flags = u16::from_le_bytes(input.take()?);
-    if flags & !HAS_DIRECT != 0 {
+    if flags & !(HAS_DIRECT | HAS_ROWS) != 0 {
         let index = usize::from(flags);
         return Err(FileError::Illegal {
             what: "flags",
@@ -183,6 +224,7 @@ pub fn read(bytes: &[u8]) -> Result<Solution, FileError> {
         patches: input.u32()? as usize,
         elements: input.u32()? as usize,
         lights: input.u32()? as usize,
+        luminaires: input.u32()? as usize,
     };
     let rows = input.u32()?;
     let spacing = Spacing {
@@ -191,7 +233,10 @@ pub fn read(bytes: &[u8]) -> Result<Solution, FileError> {
     };
     let surfaces = input.table("surfaces", counts.surfaces, 40, Input::surface)?;
     let mesh = read_mesh(&mut input, &counts, &surfaces)?;
-    let lights = input.table("lights", counts.lights, 20, Input::light)?;
+    let lights = input.table("lights", counts.lights, 24, Input::light)?;
+    let luminaires = input.table("luminaires", counts.luminaires, 52, |input| {
+        input.luminaire(counts.lights)
+    })?;
     let values = counts.elements.saturating_mul(counts.lights);
     let contributions = input.table("contributions", values, 12, Input::legal_rgb)?;
     let direct = if flags & HAS_DIRECT == 0 {
@@ -211,10 +256,16 @@ pub fn read(bytes: &[u8]) -> Result<Solution, FileError> {
     }
     Ok(Solution {
         surfaces,
+        luminaires,
         mesh,
         lights,
         contributions,
         direct,
+        method: if flags & HAS_ROWS == 0 {
+            Method::Gather
+        } else {
+            Method::Rows
+        },
         rows,
         spacing,
     })
@@ -226,6 +277,7 @@ struct Counts {
     patches: usize,
     elements: usize,
     lights: usize,
+    luminaires: usize,
 }
 
 fn read_mesh(
@@ -407,13 +459,46 @@ impl<'a> Input<'a> {
     fn light(&mut self) -> Result<Option<SolutionLight>, FileError> {
         let length = self.u32()? as usize;
         let name = std::str::from_utf8(self.bytes(length)?).ok();
-        let (emission, residual) = (self.rgb()?, self.f32()?);
+        let emission = self.rgb()?;
+        let (residual, error) = (self.f32()?, self.f32()?);
         let name = name.filter(|_| emission.is_legal());
         Ok(name.map(|name| SolutionLight {
             name: name.to_owned(),
             emission,
             residual,
+            error,
         }))
+    }
+
+    fn luminaire(&mut self, lights: usize) -> Result<Option<Luminaire>, FileError> {
+        let light = self.u32()?;
+        let (share, kind) = (self.rgb()?, self.u32()?);
+        let mut vector = || Ok(Vec3::new(self.f32()?, self.f32()?, self.f32()?));
+        let (position, direction) = (vector()?, vector()?);
+        let angles = [self.f32()?, self.f32()?];
+        let [inner, outer] = angles;
+        let source = match kind {
+            POINT => Source::Point { position },
+            SMOOTH_SPOT | LINEAR_SPOT => Source::Spot {
+                position,
+                direction,
+                inner,
+                outer,
+                falloff: if kind == LINEAR_SPOT {
+                    Falloff::Linear
+                } else {
+                    Falloff::Smooth
+                },
+            },
+            SUN => Source::Sun {
+                direction,
+                angle: inner,
+            },
+            SKY => Source::Sky,
+            _ => return Ok(None),
+        };
+        let luminaire = Luminaire::new(light, share, source).ok();
+        Ok(luminaire.filter(|_| (light as usize) < lights))
     }
 }
 
@@ -468,7 +553,7 @@ mod tests {
         let solution = sample(false);
         let sound = write(&solution);
         let surfaces = solution.surfaces.iter();
-        let faces = 44 + surfaces.map(|s| 4 + 12 * s.vertices().len()).sum::<usize>();
+        let faces = 48 + surfaces.map(|s| 4 + 12 * s.vertices().len()).sum::<usize>();
         let patches = faces + 32 * solution.mesh.faces.len();
         let elements = patches + 20 * solution.mesh.patches.len();
         let lights = elements + 32 * solution.mesh.elements.len();

@@ -6,10 +6,36 @@ use glam::Vec3;
 use relume::color::Rgb;
 use relume::geometry::Polygon;
 use relume::mesh::Spacing;
+use relume::scene::Luminaire;
 
 pub use file::{FileError, MAGIC, read, write};
 
 use crate::mesh::OwnedMesh;
+
+/// How light got from element to element.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Method {
+    /// Elements gather what rays bring them, by all threads; lamps shoot rows.
+    #[default]
+    Gather,
+    /// Patches shoot rows of exact form factors, filled by all threads.
+    Rows,
+    /// The solver alone, serially, by brute force: what a device does. Same bits as [`Self::Rows`],
+    /// and the same name in a file.
+    Device,
+}
+
+impl Method {
+    /// The name on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Gather => "gather",
+            Self::Rows => "rows",
+            Self::Device => "device",
+        }
+    }
+}
 
 /// A light of a solution.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +46,8 @@ pub struct SolutionLight {
     pub emission: Rgb,
     /// Unshot over emitted power when the bake ended.
     pub residual: f32,
+    /// Estimated relative L1 error of its irradiance, as far as the bake can tell.
+    pub error: f32,
 }
 
 /// Contributions of every light to every element, with the mesh that they belong to.
@@ -27,6 +55,8 @@ pub struct SolutionLight {
 pub struct Solution {
     /// Outlines of all surfaces, lit or not: they hide what is behind them.
     pub surfaces: Vec<Polygon>,
+    /// Lights without a surface.
+    pub luminaires: Vec<Luminaire>,
     /// Faces, patches and elements.
     pub mesh: OwnedMesh,
     /// The lights, in the order of their tags.
@@ -35,7 +65,9 @@ pub struct Solution {
     pub contributions: Vec<Rgb>,
     /// The direct part of it, where it was kept apart.
     pub direct: Option<Vec<Rgb>>,
-    /// Rows that the bake evaluated.
+    /// How the bounces were found.
+    pub method: Method,
+    /// Rows that the bake evaluated, and passes of rays.
     pub rows: u32,
     /// Longest edges that the mesh was made for, in the scene's units.
     pub spacing: Spacing,

@@ -74,12 +74,8 @@ impl Shooter {
         if self.is_out_of_sight(receiver) {
             return 0.0;
         }
-        let mut blockers = Vec::<&Polygon, BLOCKERS>::new();
-        let mut fits = true;
-        visibility.between(&Shaft::new(*receiver, self.polygon), &mut |blocker| {
-            fits &= blockers.push(blocker).is_ok();
-        });
-        let blockers = fits.then_some(blockers.as_slice());
+        let blockers = blockers(&Shaft::new(receiver, &self.polygon), visibility);
+        let blockers = blockers.as_deref();
         let points = gauss_points(receiver);
         let factors = points.iter().zip(&self.samples).map(|(point, samples)| {
             point.weight
@@ -94,7 +90,18 @@ impl Shooter {
         factors.sum::<f32>().min(1.0)
     }
 
-    /// The form factor of a point with a unit normal to what it sees of the patch, in [0, 1].
+    /// The form factor from a point with a unit normal to what it sees of the patch, in [0, 1].
+    #[must_use]
+    pub fn at_point(&self, point: Vec3, normal: Vec3, visibility: &impl Visibility) -> f32 {
+        let shaft = Shaft::from_point(point, normal, &self.polygon);
+        let blockers = blockers(&shaft, visibility);
+        let samples = self.samples.iter().flatten().copied();
+        let samples: Vec<SamplePoint, 16> = samples.collect();
+        let factor = self.seen_from(point, normal, &samples, blockers.as_deref(), visibility);
+        factor.min(1.0)
+    }
+
+    /// What a point with a unit normal sees of the patch, not below zero.
     ///
     /// `blockers` are all that can stand between, or `None` for too many to cut out.
     fn seen_from(
@@ -183,6 +190,17 @@ impl View {
 fn sees_middle(point: Vec3, above: &Clipped, visibility: &impl Visibility) -> f32 {
     let middle = above.iter().copied().sum::<Vec3>() / above.len().max(1) as f32;
     f32::from(u8::from(visibility.sees(point, point + middle)))
+}
+
+/// All that a shaft admits; `None` when it is too much to be cut out.
+fn blockers<'v>(
+    shaft: &Shaft,
+    visibility: &'v impl Visibility,
+) -> Option<Vec<&'v Polygon, BLOCKERS>> {
+    let mut blockers = Vec::new();
+    let mut fits = true;
+    visibility.between(shaft, &mut |blocker| fits &= blockers.push(blocker).is_ok());
+    fits.then_some(blockers)
 }
 
 /// True when all of `other` lies behind the plane of `polygon`, or in it.

@@ -29,6 +29,27 @@ const ROUNDINGS: f32 = 8.0 * f32::EPSILON;
 /// six digits need, and small beside every other error of a bake.
 const PLANARITY: f32 = 1e-4;
 
+/// A plane, and how exactly it is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    /// A point in it.
+    pub origin: Vec3,
+    /// Unit normal.
+    pub normal: Vec3,
+    /// How far the points that it stands for lie off it, in m.
+    pub flatness: f32,
+}
+
+impl Plane {
+    /// Signed distance of `p`, and the distance within which it counts as zero.
+    #[must_use]
+    pub fn height(&self, p: Vec3) -> (f32, f32) {
+        let height = (p - self.origin).dot(self.normal);
+        let magnitude = p.abs().max_element() + self.origin.abs().max_element();
+        (height, self.flatness + ROUNDINGS * magnitude)
+    }
+}
+
 /// A convex planar polygon of three or four vertices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Polygon {
@@ -247,13 +268,20 @@ impl Polygon {
         part
     }
 
+    /// The plane that it lies in.
+    #[must_use]
+    pub const fn plane(&self) -> Plane {
+        Plane {
+            origin: self.origin(),
+            normal: self.normal,
+            flatness: self.flatness,
+        }
+    }
+
     /// Signed distance of `p` to the plane, and the distance within which it counts as zero.
     #[must_use]
     pub fn height(&self, p: Vec3) -> (f32, f32) {
-        let origin = self.origin();
-        let height = (p - origin).dot(self.normal);
-        let magnitude = p.abs().max_element() + origin.abs().max_element();
-        (height, self.flatness + ROUNDINGS * magnitude)
+        self.plane().height(p)
     }
 
     /// Where the open segment from `from` to `to` crosses the polygon, as a fraction of its

@@ -1,6 +1,6 @@
 //! What a refinement can tell at any time: residuals, ambient terms, irradiances, counts.
 
-use super::lanes::{address, lane_of};
+use super::lanes::{address, lane_of, sum};
 use super::{Lanes, PatchState, Refinement};
 use crate::color::Rgb;
 
@@ -75,6 +75,25 @@ impl<const K: usize> Refinement<'_, K> {
             term(power.g, reflecting.g),
             term(power.b, reflecting.b),
         )
+    }
+
+    /// Estimated relative L1 error of a light's irradiance without the ambient term: what is missing
+    /// by the ambient term, over that and what has arrived. 0 for a light that sends nothing.
+    ///
+    /// It sees the light that has not been shot, not the size of patches and elements.
+    #[must_use]
+    pub fn light_error(&self, light: u32) -> f32 {
+        let (mut area, mut arrived) = (0.0, 0.0);
+        for (element, id) in self.mesh.elements.iter().zip(0..) {
+            area += element.area;
+            arrived += element.area * sum(self.irradiance(id, light));
+        }
+        let missing = sum(self.ambient(light)) * area;
+        if missing > 0.0 {
+            missing / (missing + arrived)
+        } else {
+            0.0
+        }
     }
 
     /// Irradiance of an element by a light at unit emission, W/m2, without the ambient term.

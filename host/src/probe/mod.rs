@@ -5,16 +5,20 @@
 //! holds it. A side that no light reaches has no elements and gets 0, and so does the back of a
 //! one-sided surface, which reflects nothing; a side of reflectance 0 is not stored and gives no value.
 
-use std::collections::HashMap;
+mod gather;
+
 use std::io;
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 use relume::color::Rgb;
 use relume::geometry::Polygon;
-use relume::mesh::{Element, Face, Side};
+use relume::mesh::Side;
 use thiserror::Error;
 
+use crate::mesh::Locator;
 use crate::solution::Solution;
+use gather::Gatherer;
 
 /// Reach of a surface, in diagonals of the bounding box.
 const REACH: f32 = 1e-3;
@@ -47,7 +51,9 @@ pub enum ProbeError {
     )]
     NoMesh,
     /// Direct light was not kept apart.
-    #[error("direct light was not kept apart; bake with --split-direct")]
+    #[error(
+        "direct light was not kept apart; bake with --split-direct, or evaluate it with --gather"
+    )]
     NoDirect,
     /// Writing failed.
     #[error(transparent)]
@@ -184,6 +190,43 @@ pub fn probe_points(
     })
 }
 
+/// The same, with direct light evaluated exactly at every point and indirect light gathered there.
+///
+/// # Errors
+/// [`ProbeError::NoMesh`].
+pub fn probe_gathered(
+    solution: &Solution,
+    points: &[ProbePoint],
+    part: Part,
+) -> Result<Probed, ProbeError> {
+    if solution.mesh.faces.is_empty() {
+        return Err(ProbeError::NoMesh);
+    }
+    let places = Places::new(solution);
+    let gatherer = Gatherer::new(solution);
+    let values: Vec<Option<Vec<Rgb>>> = points
+        .par_iter()
+        .enumerate()
+        .map(|(number, point)| {
+            let (surface, side) = places.side(point.position, point.normal)?;
+            let spot = gatherer.spot(surface, side, point.position)?;
+            Some(gatherer.irradiance(spot, part, number as u64))
+        })
+        .collect();
+    let mut table = Table::new("point")?;
+    let unknown = vec![Rgb::splat(f32::NAN); solution.lights.len()];
+    for (values, number) in values.iter().zip(0..) {
+        let values = values.as_ref().unwrap_or(&unknown);
+        for (light, value) in solution.lights.iter().zip(values) {
+            table.row(number, &light.name, *value)?;
+        }
+    }
+    Ok(Probed {
+        csv: table.finish()?,
+        missing: values.iter().filter(|values| values.is_none()).count(),
+    })
+}
+
 /// Irradiance per element, as CSV with the header `element,light,er,eg,eb`.
 ///
 /// # Errors
@@ -262,7 +305,7 @@ enum Place {
 /// The sides of a solution's surfaces, to be searched by place.
 struct Places<'a> {
     solution: &'a Solution,
-    faces: HashMap<(u32, Side), &'a Face>,
+    locator: Locator<'a>,
     reach: f32,
 }
 
@@ -271,17 +314,28 @@ impl<'a> Places<'a> {
         let diagonal = solution
             .bounds()
             .map_or(0.0, |(low, high)| (high - low).length());
-        let faces = solution.mesh.faces.iter();
         Self {
             solution,
-            faces: faces
-                .map(|face| ((face.surface, face.side), face))
-                .collect(),
+            locator: Locator::new(solution.mesh.view()),
             reach: REACH * diagonal,
         }
     }
 
     fn find(&self, position: Vec3, normal: Vec3) -> Place {
+        let Some((surface, side)) = self.side(position, normal) else {
+            return Place::None;
+        };
+        match self.locator.face(surface, side) {
+            None => Place::Unlit,
+            Some(_) => self
+                .locator
+                .element(surface, side, position)
+                .map_or(Place::None, |element| Place::Element(element as usize)),
+        }
+    }
+
+    /// The side of a surface on which a point lies.
+    fn side(&self, position: Vec3, normal: Vec3) -> Option<(u32, Side)> {
         let sides = self
             .solution
             .surfaces
@@ -300,44 +354,8 @@ impl<'a> Places<'a> {
                 (distance <= self.reach).then_some((distance, surface, side))
             });
         let nearest = sides.min_by(|a, b| a.0.total_cmp(&b.0));
-        let Some((_, surface, side)) = nearest else {
-            return Place::None;
-        };
-        match self.faces.get(&(surface, side)) {
-            None => Place::Unlit,
-            Some(face) => self
-                .element_at(face, position)
-                .map_or(Place::None, Place::Element),
-        }
+        nearest.map(|(_, surface, side)| (surface, side))
     }
-
-    /// The element of a face that holds a point, or comes closest to it.
-    fn element_at(&self, face: &Face, position: Vec3) -> Option<usize> {
-        let at = face.polygon.parameters(position);
-        let range = face.element_range();
-        let elements = self
-            .solution
-            .mesh
-            .elements
-            .get(range.start as usize..range.end as usize)?;
-        let is_triangle = face.polygon.is_triangle();
-        let misses = elements.iter().map(|e| outside(e, at, is_triangle));
-        let nearest = (range.start as usize..)
-            .zip(misses)
-            .min_by(|a, b| a.1.total_cmp(&b.1));
-        nearest.map(|(element, _)| element)
-    }
-}
-
-/// By how much the parameters leave an element, in its own size; 0 inside.
-fn outside(element: &Element, at: Vec2, is_triangle: bool) -> f32 {
-    let local = (at - element.from) / (element.to - element.from);
-    let beyond = if is_triangle {
-        local.x + local.y - 1.0
-    } else {
-        local.max_element() - 1.0
-    };
-    (-local.min_element()).max(beyond).max(0.0)
 }
 
 /// Distance from a point to a polygon.
