@@ -37,6 +37,17 @@ const STEPS: [f64; 4] = [
 /// Rays of every element that are cast together.
 pub const RAYS_PER_PASS: u32 = 16;
 
+/// Where a ray ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct End {
+    /// Number of the element.
+    pub element: u32,
+    /// The place, in m.
+    pub position: Vec3,
+    /// How far it is, in m.
+    pub distance: f32,
+}
+
 /// Rays through a scene that end in elements of its mesh.
 #[derive(Debug)]
 pub struct Rays<'a> {
@@ -57,34 +68,40 @@ impl<'a> Rays<'a> {
         }
     }
 
-    /// The element in which a ray ends; `None` when it escapes or is absorbed.
-    fn element(&self, from: Vec3, direction: Vec3) -> Option<u32> {
+    /// Where a ray meets an element; `None` when it escapes or is absorbed.
+    fn end(&self, from: Vec3, direction: Vec3) -> Option<End> {
         let hit = self.bvh.nearest(from, from + direction * self.far)?;
         let side = if hit.front { Side::Front } else { Side::Back };
-        let position = from + direction * (self.far * hit.fraction);
-        self.locator.element(hit.surface, side, position)
+        let distance = self.far * hit.fraction;
+        let position = from + direction * distance;
+        let element = self.locator.element(hit.surface, side, position)?;
+        Some(End {
+            element,
+            position,
+            distance,
+        })
     }
 
-    /// The elements that `count` rays from a point see, the `first` of a sequence left out.
+    /// Where `count` cosine-weighted rays from a point end.
     pub fn from_point(
         &self,
         point: Vec3,
         normal: Vec3,
         seed: u64,
         count: u32,
-    ) -> impl Iterator<Item = Option<u32>> + '_ {
+    ) -> impl Iterator<Item = Option<End>> + '_ {
         let shift = shift(seed);
         (0..count).map(move |index| {
             let [_, _, u, v] = sequence(index, shift);
-            self.element(point, cosine_direction(normal, u, v))
+            self.end(point, cosine_direction(normal, u, v))
         })
     }
 
     fn cast_from(&self, polygon: &Polygon, seed: u64, index: u32) -> u32 {
         let [s, t, u, v] = sequence(index, shift(seed));
         let (point, _) = from_unit_square(polygon, Vec2::new(s, t));
-        let element = self.element(point, cosine_direction(polygon.normal(), u, v));
-        element.unwrap_or(NOTHING)
+        let end = self.end(point, cosine_direction(polygon.normal(), u, v));
+        end.map_or(NOTHING, |end| end.element)
     }
 }
 

@@ -27,8 +27,8 @@ pub trait RowFiller {
     /// Direct irradiance of every element by a luminaire at unit emission, W/m2.
     fn luminaire(&self, mesh: &Mesh, luminaire: &Luminaire, far: f32, row: &mut [f32]);
 
-    /// Form factors from every element to a patch.
-    fn patch(&self, mesh: &Mesh, patch: u32, row: &mut [f32]);
+    /// Form factors from every element to a polygon: a patch, or a whole lamp.
+    fn shooter(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]);
 }
 
 /// The solver alone, by brute force: what a device does.
@@ -43,8 +43,8 @@ impl RowFiller for Serial<'_> {
         luminaire::fill(mesh, luminaire, far, 0, &self.0, row);
     }
 
-    fn patch(&self, mesh: &Mesh, patch: u32, row: &mut [f32]) {
-        form_factor::row(mesh, patch, &self.0, row);
+    fn shooter(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
+        form_factor::fill(mesh, &Shooter::new(*polygon), 0, &self.0, row);
     }
 }
 
@@ -92,12 +92,9 @@ impl RowFiller for Parallel<'_> {
             });
     }
 
-    fn patch(&self, mesh: &Mesh, patch: u32, row: &mut [f32]) {
+    fn shooter(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
         row.fill(0.0);
-        let Some(polygon) = mesh.patch_polygon(patch) else {
-            return;
-        };
-        let shooter = Shooter::new(polygon);
+        let shooter = Shooter::new(*polygon);
         let factors: Vec<Vec<f32>> = self
             .patches
             .par_iter()
@@ -105,8 +102,8 @@ impl RowFiller for Parallel<'_> {
                 if shooter.is_out_of_sight(receiver) {
                     return Vec::new();
                 }
-                let margin = ROUNDINGS * largest_coordinate(&[polygon, *receiver]);
-                let shaft = Shaft::with_margin(receiver, &polygon, margin);
+                let margin = ROUNDINGS * largest_coordinate(&[*polygon, *receiver]);
+                let shaft = Shaft::with_margin(receiver, polygon, margin);
                 let narrowed = self.bvh.narrowed(&shaft);
                 let receivers = self.elements[range.clone()].iter();
                 let receivers = receivers.filter_map(|e| mesh.elements.get(*e as usize));

@@ -4,7 +4,7 @@ use relume::color::Rgb;
 use relume::luminaire;
 use relume::refine::Lanes;
 
-use super::direct::{self, DirectRow, lamp_count};
+use super::direct::{self, DirectRow, DirectSource, Lamps};
 use super::{BakeError, Job, LANES, Settings, Solved};
 use crate::bvh::Bvh;
 use crate::gather::{Hits, RAYS_PER_PASS, Rays};
@@ -27,11 +27,11 @@ pub(super) fn gather(job: &mut Job, mesh: OwnedMesh, bvh: &Bvh) -> Result<Solved
     let passes = MOST_PASSES
         .min((HIT_BYTES / pass_bytes.max(1)) as u32)
         .max(1);
-    let most = lamp_count(&mesh) + passes;
+    let most = direct::shooters(&mesh, Lamps::Whole).len() as u32 + passes;
 
     let mut light = Light::new(&mesh, job.lights());
     let filler = Parallel::new(&view, bvh);
-    let lamps = direct::visit(job, &mesh, &filler, most, true, |row| {
+    let lamps = direct::visit(job, &mesh, &filler, Lamps::Whole, most, |row| {
         light.add(&row);
         Ok(())
     })?;
@@ -39,7 +39,7 @@ pub(super) fn gather(job: &mut Job, mesh: OwnedMesh, bvh: &Bvh) -> Result<Solved
     let rays = Rays::new(view, bvh, luminaire::far(job.scene));
     let mut hits = Hits::default();
     let mut next_look = FIRST_LOOK;
-    while lamps.are_complete && (hits.passes() as u32) < passes {
+    while lamps.is_complete && (hits.passes() as u32) < passes {
         let rows = lamps.rows + hits.passes() as u32;
         if job.ends(rows, most, light.residual()) {
             break;
@@ -100,13 +100,10 @@ impl Light {
                 .collect(),
             passes: 0,
         };
-        let view = mesh.view();
-        for (patch, id) in mesh.patches.iter().zip(0..) {
-            if let Some(emission) = view.patch_emission(id) {
-                let (block, lane) = light.lane(emission.light);
-                block.emitted[lane] += patch.area * total(emission.share);
-                block.waiting[lane] += patch.area * total(emission.share);
-            }
+        for (_, polygon, emission) in direct::shooters(mesh, Lamps::Whole) {
+            let (block, lane) = light.lane(emission.light);
+            block.emitted[lane] += polygon.area() * total(emission.share);
+            block.waiting[lane] += polygon.area() * total(emission.share);
         }
         light
     }
@@ -126,9 +123,10 @@ impl Light {
             }
         }
         let power = row.power * total(row.share);
-        match row.patch {
-            Some(_) => block.waiting[lane] = (block.waiting[lane] - power).max(0.0),
-            None => block.emitted[lane] += power,
+        if row.source == DirectSource::Luminaire {
+            block.emitted[lane] += power;
+        } else {
+            block.waiting[lane] = (block.waiting[lane] - power).max(0.0);
         }
     }
 

@@ -1,11 +1,35 @@
-//! Direct light: one row for every luminaire and every patch of a lamp.
+//! Direct light: one row for every luminaire, and for every lamp or every patch of one.
 
 use relume::color::Rgb;
+use relume::geometry::Polygon;
 use relume::luminaire;
+use relume::scene::Emission;
 
 use super::{BakeError, Job, Progress};
 use crate::mesh::OwnedMesh;
 use crate::rows::RowFiller;
+
+/// What emits along a row.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum DirectSource {
+    /// A point, spot, sun or sky.
+    Luminaire,
+    /// A whole face.
+    Face,
+    /// A patch by number.
+    Patch(u32),
+}
+
+/// Into what lamps are cut to shoot their emission.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Lamps {
+    /// Not shot here.
+    Waiting,
+    /// A row for each face: it emits evenly, and form factors are exact.
+    Whole,
+    /// A row for each patch, as the refinement wants it.
+    Patches,
+}
 
 /// A row of direct light.
 pub(super) struct DirectRow<'a> {
@@ -13,32 +37,32 @@ pub(super) struct DirectRow<'a> {
     pub light: u32,
     /// What share of the light it is, per channel.
     pub share: Rgb,
-    /// The patch that emits; `None` for a luminaire.
-    pub patch: Option<u32>,
-    /// Power that leaves the patch, or arrives from the luminaire, at a share of one, W.
+    /// What emits.
+    pub source: DirectSource,
+    /// Power that leaves the lamp, or arrives from the luminaire, at a share of one, W.
     pub power: f32,
     /// Irradiance of every element at a share of one, W/m2.
     pub row: &'a [f32],
 }
 
 /// Rows that have been evaluated, and whether they are all.
-pub(super) struct Lamps {
+pub(super) struct Visited {
     /// Rows of lamps; those of luminaires are not counted.
     pub rows: u32,
     /// True when every lamp has been shot.
-    pub are_complete: bool,
+    pub is_complete: bool,
 }
 
-/// Visits the direct light of every luminaire, then, if asked for, of every patch that emits, until
-/// the job ends. `most` is how many rows there may be in all.
+/// Visits the direct light of every luminaire, then of every lamp, until the job ends. `most` is
+/// how many rows there may be in all.
 pub(super) fn visit(
     job: &mut Job,
     mesh: &OwnedMesh,
     filler: &impl RowFiller,
+    lamps: Lamps,
     most: u32,
-    with_lamps: bool,
     mut visit: impl FnMut(DirectRow) -> Result<(), BakeError>,
-) -> Result<Lamps, BakeError> {
+) -> Result<Visited, BakeError> {
     let view = mesh.view();
     let scene = job.scene;
     let mut row = vec![0.0; mesh.elements.len()];
@@ -53,49 +77,53 @@ pub(super) fn visit(
         visit(DirectRow {
             light: luminaire.light(),
             share: luminaire.share(),
-            patch: None,
+            source: DirectSource::Luminaire,
             power: arrived.map(|(value, element)| value * element.area).sum(),
             row: &row,
         })?;
     }
+    let shooters = shooters(mesh, lamps);
     let mut rows = 0;
-    if !with_lamps {
-        return Ok(Lamps {
-            rows,
-            are_complete: false,
-        });
-    }
-    for (patch, id) in mesh.patches.iter().zip(0..) {
-        let Some(emission) = view.patch_emission(id) else {
-            continue;
-        };
+    for (source, polygon, emission) in &shooters {
         if job.ends(rows, most, 1.0) {
-            return Ok(Lamps {
-                rows,
-                are_complete: false,
-            });
+            break;
         }
-        filler.patch(&view, id, &mut row);
+        filler.shooter(&view, polygon, &mut row);
         rows += 1;
         visit(DirectRow {
             light: emission.light,
             share: emission.share,
-            patch: Some(id),
-            power: patch.area,
+            source: *source,
+            power: polygon.area(),
             row: &row,
         })?;
     }
-    Ok(Lamps {
+    Ok(Visited {
         rows,
-        are_complete: true,
+        is_complete: lamps != Lamps::Waiting && rows as usize == shooters.len(),
     })
 }
 
-/// How many patches emit.
-pub(super) fn lamp_count(mesh: &OwnedMesh) -> u32 {
+/// All that emits, cut as asked for.
+pub(super) fn shooters(mesh: &OwnedMesh, lamps: Lamps) -> Vec<(DirectSource, Polygon, Emission)> {
     let view = mesh.view();
-    let patches = 0..mesh.patches.len() as u32;
-    patches
-        .filter(|p| view.patch_emission(*p).is_some())
-        .count() as u32
+    match lamps {
+        Lamps::Waiting => Vec::new(),
+        Lamps::Whole => {
+            let faces = mesh.faces.iter();
+            faces
+                .filter_map(|face| Some((DirectSource::Face, face.polygon, face.emission?)))
+                .collect()
+        }
+        Lamps::Patches => (0..mesh.patches.len() as u32)
+            .filter_map(|patch| {
+                let emission = view.patch_emission(patch)?;
+                Some((
+                    DirectSource::Patch(patch),
+                    view.patch_polygon(patch)?,
+                    emission,
+                ))
+            })
+            .collect(),
+    }
 }

@@ -4,7 +4,7 @@ use relume::color::Rgb;
 use relume::mesh::Mesh;
 use relume::refine::{Block, Choice, PatchState, Refinement, RowStorage, Storage};
 
-use super::direct::{self, lamp_count};
+use super::direct::{self, DirectSource, Lamps};
 use super::{BakeError, Job, LANES, Settings, Solved};
 use crate::mesh::{Direct, OwnedMesh, Split, split};
 use crate::rows::RowFiller;
@@ -22,7 +22,7 @@ const SHOOTERS_PER_PATCH: usize = 3;
 struct Held {
     light: u32,
     share: Rgb,
-    patch: Option<u32>,
+    source: DirectSource,
     row: Vec<f32>,
 }
 
@@ -36,24 +36,28 @@ pub(super) fn refine<F: RowFiller>(
     let lights = job.lights();
     // As published, and where the rows of the lamps are too many to be held, lamps are shot like
     // any other patch.
-    let bytes = lamp_count(&mesh) as usize * mesh.elements.len() * 4;
-    let lamps_first = !settings.plain && bytes <= LAMP_BYTES;
+    let bytes = direct::shooters(&mesh, Lamps::Patches).len() * mesh.elements.len() * 4;
+    let lamps = if !settings.plain && bytes <= LAMP_BYTES {
+        Lamps::Patches
+    } else {
+        Lamps::Waiting
+    };
     let mut held = Vec::new();
     let mut irradiance = vec![0.0; mesh.elements.len() * lights];
     let most = (mesh.patches.len() * SHOOTERS_PER_PATCH) as u32;
     let direct_filler = filler(&mesh.view());
-    let lamps = direct::visit(job, &mesh, &direct_filler, most, lamps_first, |direct| {
+    let visited = direct::visit(job, &mesh, &direct_filler, lamps, most, |direct| {
         add_direct(&mut irradiance, lights, &direct);
         held.push(Held {
             light: direct.light,
             share: direct.share,
-            patch: direct.patch,
+            source: direct.source,
             row: direct.row.to_vec(),
         });
         Ok(())
     })?;
     let mut first: Vec<u32> = (0..mesh.patches.len() as u32).collect();
-    if lamps_first && lamps.are_complete {
+    if visited.is_complete {
         let irradiance = irradiance.as_slice();
         let direct = Direct { irradiance, lights };
         let budget = SHOOTERS_PER_PATCH * mesh.patches.len();
@@ -74,13 +78,14 @@ pub(super) fn refine<F: RowFiller>(
     for Held {
         light,
         share,
-        patch,
+        source,
         row,
     } in held
     {
-        match patch {
-            None => refinement.illuminate(light, share, &row)?,
-            Some(patch) => refinement.shoot(first[patch as usize], &row)?,
+        if let DirectSource::Patch(patch) = source {
+            refinement.shoot(first[patch as usize], &row)?;
+        } else {
+            refinement.illuminate(light, share, &row)?;
         }
     }
     let filler = filler(&mesh.view());
@@ -90,7 +95,9 @@ pub(super) fn refine<F: RowFiller>(
         if job.ends(refinement.rows_evaluated(), most, refinement.residual()) {
             break;
         }
-        filler.patch(&mesh.view(), patch, &mut row);
+        if let Some(polygon) = mesh.view().patch_polygon(patch) {
+            filler.shooter(&mesh.view(), &polygon, &mut row);
+        }
         refinement.shoot(patch, &row)?;
     }
     refinement.finish();

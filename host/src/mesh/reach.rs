@@ -53,7 +53,7 @@ const PARTS_AT_ONCE: usize = 64;
 /// Rays that light casts from each luminaire, and from each patch of a lamp.
 const CASTS: u64 = 64;
 
-/// Form factor of what rounding leaves between blockers that share an edge.
+/// Form factor below which a lamp is out of sight: rounding leaves slivers between blockers.
 const SLIVER: f32 = 1e-6;
 
 /// By how much a point is drawn from its polygon's outline towards the middle, away from edges.

@@ -3,22 +3,31 @@
 //! `E(x) = sum over lamps F(x, visible part of the lamp) + luminaires + 1/R sum_r rho_h(r) E_h(r)`
 //!
 //! Rays `r` leave the point cosine-weighted and end in elements `h(r)`, whose irradiance the solution
-//! holds (final gather; Reichert 1992). Assumption: lamps radiate evenly from their front.
+//! holds (final gather; Reichert 1992). Where a ray ends nearby, the edge of a shadow inside the
+//! element matters: there the direct part of `E_h` is that of the place itself, with one shadow ray
+//! to each lamp. Assumption: lamps radiate evenly from their front.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use relume::color::Rgb;
 use relume::form_factor::Shooter;
+use relume::geometry::{Polygon, from_unit_square};
 use relume::luminaire;
-use relume::mesh::{Element, Side};
+use relume::mesh::Side;
 use relume::scene::{Emission, Surface};
+use relume::visibility::Visibility;
 
 use super::Part;
 use crate::bvh::Bvh;
 use crate::gather::Rays;
+use crate::noise;
+use crate::rows::{Parallel, RowFiller};
 use crate::solution::Solution;
 
 /// Rays from a point.
 const RAYS: u32 = 2048;
+
+/// Ends of rays that are nearer than so many edges of their element are looked at themselves.
+const NEAR: f32 = 8.0;
 
 /// Interleaved sets of directions towards sun and sky.
 const SETS: u32 = 32;
@@ -38,6 +47,8 @@ pub(super) struct Gatherer<'a> {
     solution: &'a Solution,
     bvh: Bvh,
     lamps: Vec<(Shooter, Emission)>,
+    /// Direct irradiance of the elements, light inside.
+    direct: Vec<Rgb>,
     far: f32,
 }
 
@@ -52,9 +63,11 @@ impl<'a> Gatherer<'a> {
         let far = 2.0 * (high - low).length();
         let farthest = low.abs().max(high.abs()).max_element() + far;
         let faces = solution.mesh.faces.iter();
+        let bvh = Bvh::new(&surfaces, farthest);
         Self {
             solution,
-            bvh: Bvh::new(&surfaces, farthest),
+            direct: direct_of_elements(solution, &bvh, far),
+            bvh,
             lamps: faces
                 .filter_map(|face| Some((Shooter::new(face.polygon), face.emission?)))
                 .collect(),
@@ -99,18 +112,98 @@ impl<'a> Gatherer<'a> {
         values
     }
 
-    fn add_indirect(&self, Spot { position, normal }: Spot, seed: u64, values: &mut [Rgb]) {
+    fn add_indirect(&self, spot: Spot, seed: u64, values: &mut [Rgb]) {
         let mesh = self.solution.mesh.view();
         let rays = Rays::new(mesh, &self.bvh, self.far);
-        for hit in rays.from_point(position, normal, seed, RAYS).flatten() {
-            let Some(Element { reflectance, .. }) = mesh.elements.get(hit as usize) else {
+        let ends = rays.from_point(spot.position, spot.normal, seed, RAYS);
+        for (end, number) in ends.zip(seed * u64::from(RAYS)..) {
+            let Some((end, element)) = end.and_then(|end| {
+                let element = mesh.elements.get(end.element as usize)?;
+                Some((end, element))
+            }) else {
                 continue;
             };
-            let share = *reflectance * (1.0 / RAYS as f32);
-            let contributions = self.solution.element(hit as usize);
-            for (value, contribution) in values.iter_mut().zip(contributions) {
-                *value += share * *contribution;
+            let share = element.reflectance * (1.0 / RAYS as f32);
+            let contributions = self.solution.element(end.element as usize);
+            let is_near = end.distance < NEAR * element.area.sqrt();
+            match mesh.element_face(element).filter(|_| is_near) {
+                None => {
+                    for (value, contribution) in values.iter_mut().zip(contributions) {
+                        *value += share * *contribution;
+                    }
+                }
+                Some(face) => {
+                    let place = self.place(&face.polygon, end.position);
+                    let direct = self.direct_at(place, number);
+                    let own = self.element_direct(end.element);
+                    let parts = contributions.iter().zip(own).zip(direct);
+                    for (value, ((all, own), direct)) in values.iter_mut().zip(parts) {
+                        let indirect = (*all - *own).map(|v| v.max(0.0));
+                        *value += share * (indirect + direct);
+                    }
+                }
             }
         }
     }
+
+    fn place(&self, outline: &Polygon, position: Vec3) -> Spot {
+        Spot {
+            position: position + (outline.center() - position) * INWARDS,
+            normal: outline.normal(),
+        }
+    }
+
+    fn element_direct(&self, element: u32) -> &[Rgb] {
+        let lights = self.solution.lights.len();
+        let first = element as usize * lights;
+        self.direct.get(first..first + lights).unwrap_or_default()
+    }
+
+    /// Direct irradiance by one shadow ray to each lamp and luminaire; the sky's as the element has it.
+    fn direct_at(&self, Spot { position, normal }: Spot, seed: u64) -> Vec<Rgb> {
+        let mut values = vec![Rgb::BLACK; self.solution.lights.len()];
+        let at = Vec2::new(noise::unit(2 * seed), noise::unit(2 * seed + 1));
+        for (lamp, emission) in &self.lamps {
+            let factor = lamp.open_at_point(position, normal);
+            let (on_lamp, _) = from_unit_square(lamp.polygon(), at);
+            if factor > 0.0 && self.bvh.sees(position, on_lamp) {
+                values[emission.light as usize] += emission.share * factor;
+            }
+        }
+        for luminaire in &self.solution.luminaires {
+            let source = luminaire.source();
+            let value = luminaire::at_point(source, position, normal, self.far, 1, &self.bvh);
+            values[luminaire.light() as usize] += luminaire.share() * value;
+        }
+        values
+    }
+}
+
+/// Direct irradiance of every element at unit emission, light inside.
+fn direct_of_elements(solution: &Solution, bvh: &Bvh, far: f32) -> Vec<Rgb> {
+    let mesh = solution.mesh.view();
+    let lights = solution.lights.len();
+    let mut direct = vec![Rgb::BLACK; mesh.elements.len() * lights];
+    let mut row = vec![0.0; mesh.elements.len()];
+    let filler = Parallel::new(&mesh, bvh);
+    let mut add = |light: u32, share: Rgb, row: &[f32]| {
+        let values = direct
+            .iter_mut()
+            .skip(light as usize)
+            .step_by(lights.max(1));
+        for (value, factor) in values.zip(row) {
+            *value += share * *factor;
+        }
+    };
+    for face in mesh.faces {
+        if let Some(emission) = face.emission {
+            filler.shooter(&mesh, &face.polygon, &mut row);
+            add(emission.light, emission.share, &row);
+        }
+    }
+    for luminaire in &solution.luminaires {
+        filler.luminaire(&mesh, luminaire, far, &mut row);
+        add(luminaire.light(), luminaire.share(), &row);
+    }
+    direct
 }

@@ -62,6 +62,12 @@ impl Shooter {
         }
     }
 
+    /// The polygon that shoots.
+    #[must_use]
+    pub const fn polygon(&self) -> &Polygon {
+        &self.polygon
+    }
+
     /// True when the receiver or the shooter lies wholly behind the other, or in its plane.
     #[must_use]
     pub fn is_out_of_sight(&self, receiver: &Polygon) -> bool {
@@ -99,6 +105,16 @@ impl Shooter {
         let samples: Vec<SamplePoint, 16> = samples.collect();
         let factor = self.seen_from(point, normal, &samples, blockers.as_deref(), visibility);
         factor.min(1.0)
+    }
+
+    /// The form factor from a point with a unit normal to the patch, unoccluded, in [0, 1].
+    #[must_use]
+    pub fn open_at_point(&self, point: Vec3, normal: Vec3) -> f32 {
+        let (height, tolerance) = self.polygon.height(point);
+        if height <= tolerance {
+            return 0.0;
+        }
+        point_to_polygon(point, normal, self.polygon.vertices())
     }
 
     /// What a point with a unit normal sees of the patch, not below zero.

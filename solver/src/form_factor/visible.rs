@@ -18,6 +18,10 @@ use crate::geometry::{Clipped, Polygon, clip};
 /// Most pieces that wait to be cut.
 const PIECES: usize = 24;
 
+/// Share of a polygon below which what is left of it is rounding: blockers that share an edge leave
+/// slivers between their pyramids.
+const SLIVER: f32 = 2e-6;
+
 /// Most blockers that really hide something from one point.
 const CONES: usize = 16;
 
@@ -47,6 +51,7 @@ pub(super) fn visible_factor(
         }
     }
 
+    let least = SLIVER * lambert(normal, &outline);
     let mut sum = 0.0;
     let mut waiting = Vec::<(Clipped, usize), PIECES>::new();
     waiting.push((outline, 0)).ok()?;
@@ -70,7 +75,7 @@ pub(super) fn visible_factor(
             }
         }
     }
-    Some(sum)
+    Some(if sum > least { sum } else { 0.0 })
 }
 
 /// [`clip`], unless the outline has too many corners for it.
