@@ -179,6 +179,14 @@ pub struct Narrowed<'a> {
     blockers: Vec<&'a Polygon>,
 }
 
+impl Narrowed<'_> {
+    /// How many there are.
+    #[must_use]
+    pub const fn blockers(&self) -> usize {
+        self.blockers.len()
+    }
+}
+
 impl Visibility for Narrowed<'_> {
     fn sees(&self, from: Vec3, to: Vec3) -> bool {
         self.bvh.sees(from, to)

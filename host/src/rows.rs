@@ -6,6 +6,7 @@
 
 use std::ops::Range;
 
+use glam::Vec2;
 use rayon::prelude::*;
 use relume::form_factor::{self, Shooter};
 use relume::geometry::Polygon;
@@ -14,13 +15,19 @@ use relume::mesh::Mesh;
 use relume::scene::Luminaire;
 use relume::visibility::{Occluders, Shaft};
 
-use crate::bvh::Bvh;
+use crate::bvh::{Bvh, Narrowed};
 
 /// Receivers of direct light that one task fills.
 const CHUNK: usize = 64;
 
 /// Roundings by which the outline of an element may stick out of its patch.
 const ROUNDINGS: f32 = 16.0 * f32::EPSILON;
+
+/// Surfaces between a lamp and a patch that are so many that the lamp is quartered.
+const MANY_BLOCKERS: usize = 12;
+
+/// How often a lamp is quartered at most.
+const MOST_QUARTERINGS: u32 = 3;
 
 /// Fills rows.
 pub trait RowFiller {
@@ -29,6 +36,11 @@ pub trait RowFiller {
 
     /// Form factors from every element to a polygon: a patch, or a whole lamp.
     fn shooter(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]);
+
+    /// The same for a whole lamp, which may be large and seen through much.
+    fn lamp(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
+        self.shooter(mesh, polygon, row);
+    }
 }
 
 /// The solver alone, by brute force: what a device does.
@@ -93,25 +105,26 @@ impl RowFiller for Parallel<'_> {
     }
 
     fn shooter(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
-        row.fill(0.0);
         let shooter = Shooter::new(*polygon);
-        let factors: Vec<Vec<f32>> = self
-            .patches
-            .par_iter()
-            .map(|(receiver, range)| {
-                if shooter.is_out_of_sight(receiver) {
-                    return Vec::new();
-                }
-                let margin = ROUNDINGS * largest_coordinate(&[*polygon, *receiver]);
-                let shaft = Shaft::with_margin(receiver, polygon, margin);
-                let narrowed = self.bvh.narrowed(&shaft);
-                let receivers = self.elements[range.clone()].iter();
-                let receivers = receivers.filter_map(|e| mesh.elements.get(*e as usize));
-                receivers
-                    .filter_map(|element| mesh.element_polygon(element))
-                    .map(|receiver| shooter.form_factor(&receiver, &narrowed))
-                    .collect()
-            })
+        self.fill(row, |receiver, range| {
+            self.factors(mesh, &shooter, receiver, range)
+        });
+    }
+
+    fn lamp(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
+        self.fill(row, |receiver, range| {
+            self.lamp_factors(mesh, polygon, receiver, range, 0)
+        });
+    }
+}
+
+impl Parallel<'_> {
+    /// Fills a row from the factors of the elements of every patch.
+    fn fill(&self, row: &mut [f32], factors: impl Fn(&Polygon, &Range<usize>) -> Vec<f32> + Sync) {
+        row.fill(0.0);
+        let patches = self.patches.par_iter();
+        let factors: Vec<Vec<f32>> = patches
+            .map(|(receiver, range)| factors(receiver, range))
             .collect();
         for ((_, range), factors) in self.patches.iter().zip(factors) {
             for (element, factor) in self.elements[range.clone()].iter().zip(factors) {
@@ -119,6 +132,92 @@ impl RowFiller for Parallel<'_> {
             }
         }
     }
+
+    /// Form factors of the elements of one patch; none where the shooter is out of sight.
+    fn factors(
+        &self,
+        mesh: &Mesh,
+        shooter: &Shooter,
+        receiver: &Polygon,
+        range: &Range<usize>,
+    ) -> Vec<f32> {
+        if shooter.is_out_of_sight(receiver) {
+            return Vec::new();
+        }
+        let narrowed = self.narrowed(shooter.polygon(), receiver);
+        self.element_factors(mesh, shooter, range, &narrowed)
+    }
+
+    /// The same; where much stands between, the lamp is quartered, so that less is in the way of each
+    /// part.
+    fn lamp_factors(
+        &self,
+        mesh: &Mesh,
+        lamp: &Polygon,
+        receiver: &Polygon,
+        range: &Range<usize>,
+        depth: u32,
+    ) -> Vec<f32> {
+        let shooter = Shooter::new(*lamp);
+        if shooter.is_out_of_sight(receiver) {
+            return Vec::new();
+        }
+        let narrowed = self.narrowed(lamp, receiver);
+        if narrowed.blockers() <= MANY_BLOCKERS || depth == MOST_QUARTERINGS {
+            return self.element_factors(mesh, &shooter, range, &narrowed);
+        }
+        let mut sum = vec![0.0; range.len()];
+        for quarter in quarters(lamp) {
+            let factors = self.lamp_factors(mesh, &quarter, receiver, range, depth + 1);
+            for (sum, factor) in sum.iter_mut().zip(factors) {
+                *sum += factor;
+            }
+        }
+        sum
+    }
+
+    fn narrowed(&self, shooter: &Polygon, receiver: &Polygon) -> Narrowed<'_> {
+        let margin = ROUNDINGS * largest_coordinate(&[*shooter, *receiver]);
+        let shaft = Shaft::with_margin(receiver, shooter, margin);
+        self.bvh.narrowed(&shaft)
+    }
+
+    fn element_factors(
+        &self,
+        mesh: &Mesh,
+        shooter: &Shooter,
+        range: &Range<usize>,
+        visibility: &Narrowed,
+    ) -> Vec<f32> {
+        let elements = self.elements[range.clone()].iter();
+        elements
+            .filter_map(|element| mesh.elements.get(*element as usize))
+            .filter_map(|element| mesh.element_polygon(element))
+            .map(|receiver| shooter.form_factor(&receiver, visibility))
+            .collect()
+    }
+}
+
+/// Four parts of a polygon.
+#[must_use]
+pub fn quarters(polygon: &Polygon) -> [Polygon; 4] {
+    let half = Vec2::splat(0.5);
+    let corners = if polygon.is_triangle() {
+        [
+            (Vec2::ZERO, half),
+            (Vec2::new(0.5, 0.0), Vec2::new(1.0, 0.5)),
+            (Vec2::new(0.0, 0.5), Vec2::new(0.5, 1.0)),
+            (half, Vec2::ZERO),
+        ]
+    } else {
+        [
+            (Vec2::ZERO, half),
+            (Vec2::new(0.5, 0.0), Vec2::new(1.0, 0.5)),
+            (Vec2::new(0.0, 0.5), Vec2::new(0.5, 1.0)),
+            (half, Vec2::ONE),
+        ]
+    };
+    corners.map(|(from, to)| polygon.part(from, to))
 }
 
 fn largest_coordinate(polygons: &[Polygon]) -> f32 {

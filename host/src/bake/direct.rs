@@ -88,7 +88,10 @@ pub(super) fn visit(
         if job.ends(rows, most, 1.0) {
             break;
         }
-        filler.shooter(&view, polygon, &mut row);
+        match lamps {
+            Lamps::Whole => filler.lamp(&view, polygon, &mut row),
+            Lamps::Waiting | Lamps::Patches => filler.shooter(&view, polygon, &mut row),
+        }
         rows += 1;
         visit(DirectRow {
             light: emission.light,

@@ -1,11 +1,14 @@
 //! Light at a point, better than its element knows it: direct light exactly, indirect light gathered.
 //!
-//! `E(x) = sum over lamps F(x, visible part of the lamp) + luminaires + 1/R sum_r rho_h(r) E_h(r)`
+//! `E(x) = sum over lamps F(x, l) + luminaires + sum over far patches F(x, p) B_p
+//!        + 1/R sum over rays that end in near patches rho_h(r) E_h(r)`
 //!
-//! Rays `r` leave the point cosine-weighted and end in elements `h(r)`, whose irradiance the solution
-//! holds (final gather; Reichert 1992). Where a ray ends nearby, the edge of a shadow inside the
-//! element matters: there the direct part of `E_h` is that of the place itself, with one shadow ray
-//! to each lamp. Assumption: lamps radiate evenly from their front.
+//! `F` is the form factor of what is visible, cut out exactly; `B_p` the radiosity that the solution
+//! gives patch `p`, constant over it, which does no harm from afar. Rays `r` leave the point
+//! cosine-weighted; where one ends in an element `h` of a near patch the variation inside it
+//! matters, and where it ends within a few elements even the edge of a shadow does: there the
+//! direct part of `E_h` is that of the place itself, with one shadow ray to each lamp (final gather;
+//! Reichert 1992). Assumption: lamps radiate evenly from their front.
 
 use glam::{Vec2, Vec3};
 use relume::color::Rgb;
@@ -20,11 +23,17 @@ use super::Part;
 use crate::bvh::Bvh;
 use crate::gather::Rays;
 use crate::noise;
-use crate::rows::{Parallel, RowFiller};
+use crate::rows::{Parallel, RowFiller, quarters};
 use crate::solution::Solution;
 
 /// Rays from a point.
 const RAYS: u32 = 2048;
+
+/// Patches that are farther than so many of their longest edges count as constant.
+const FAR: f32 = 6.0;
+
+/// How often a lamp is quartered at most.
+const MOST_QUARTERINGS: u32 = 5;
 
 /// Ends of rays that are nearer than so many edges of their element are looked at themselves.
 const NEAR: f32 = 8.0;
@@ -49,6 +58,7 @@ pub(super) struct Gatherer<'a> {
     lamps: Vec<(Shooter, Emission)>,
     /// Direct irradiance of the elements, light inside.
     direct: Vec<Rgb>,
+    patches: Vec<RadiantPatch>,
     far: f32,
 }
 
@@ -67,6 +77,7 @@ impl<'a> Gatherer<'a> {
         Self {
             solution,
             direct: direct_of_elements(solution, &bvh, far),
+            patches: radiant_patches(solution),
             bvh,
             lamps: faces
                 .filter_map(|face| Some((Shooter::new(face.polygon), face.emission?)))
@@ -93,7 +104,8 @@ impl<'a> Gatherer<'a> {
     pub fn irradiance(&self, spot: Spot, part: Part, seed: u64) -> Vec<Rgb> {
         let mut values = self.direct(spot);
         if part == Part::Total {
-            self.add_indirect(spot, seed, &mut values);
+            self.add_far(spot, &mut values);
+            self.add_near(spot, seed, &mut values);
         }
         values
     }
@@ -101,7 +113,7 @@ impl<'a> Gatherer<'a> {
     fn direct(&self, Spot { position, normal }: Spot) -> Vec<Rgb> {
         let mut values = vec![Rgb::BLACK; self.solution.lights.len()];
         for (lamp, emission) in &self.lamps {
-            let factor = lamp.at_point(position, normal, &self.bvh);
+            let factor = self.lamp_factor(lamp, Spot { position, normal }, 0);
             values[emission.light as usize] += emission.share * factor;
         }
         for luminaire in &self.solution.luminaires {
@@ -112,14 +124,41 @@ impl<'a> Gatherer<'a> {
         values
     }
 
-    fn add_indirect(&self, spot: Spot, seed: u64, values: &mut [Rgb]) {
+    /// What the place sees of a lamp; where much stands between, of its quarters.
+    fn lamp_factor(&self, lamp: &Shooter, spot: Spot, depth: u32) -> f32 {
+        let Spot { position, normal } = spot;
+        match lamp.exact_at_point(position, normal, &self.bvh) {
+            Some(factor) => factor,
+            None if depth == MOST_QUARTERINGS => lamp.at_point(position, normal, &self.bvh),
+            None => quarters(lamp.polygon())
+                .into_iter()
+                .map(|quarter| self.lamp_factor(&Shooter::new(quarter), spot, depth + 1))
+                .sum(),
+        }
+    }
+
+    fn add_far(&self, Spot { position, normal }: Spot, values: &mut [Rgb]) {
+        for patch in &self.patches {
+            if patch.is_far(position) {
+                let factor = patch.shooter.at_point(position, normal, &self.bvh);
+                if factor > 0.0 {
+                    for (value, radiosity) in values.iter_mut().zip(&patch.radiosity) {
+                        *value += *radiosity * factor;
+                    }
+                }
+            }
+        }
+    }
+
+    fn add_near(&self, spot: Spot, seed: u64, values: &mut [Rgb]) {
         let mesh = self.solution.mesh.view();
         let rays = Rays::new(mesh, &self.bvh, self.far);
         let ends = rays.from_point(spot.position, spot.normal, seed, RAYS);
         for (end, number) in ends.zip(seed * u64::from(RAYS)..) {
             let Some((end, element)) = end.and_then(|end| {
                 let element = mesh.elements.get(end.element as usize)?;
-                Some((end, element))
+                let patch = self.patches.get(element.patch as usize)?;
+                (!patch.is_far(spot.position)).then_some((end, element))
             }) else {
                 continue;
             };
@@ -179,6 +218,44 @@ impl<'a> Gatherer<'a> {
     }
 }
 
+/// A patch as it looks from afar.
+struct RadiantPatch {
+    shooter: Shooter,
+    /// Longest edge, m.
+    size: f32,
+    /// Reflected radiosity by every light at unit emission, W/m2.
+    radiosity: Vec<Rgb>,
+}
+
+impl RadiantPatch {
+    fn is_far(&self, point: Vec3) -> bool {
+        let center = self.shooter.polygon().center();
+        point.distance_squared(center) > (FAR * self.size).powi(2)
+    }
+}
+
+/// All patches by number.
+fn radiant_patches(solution: &Solution) -> Vec<RadiantPatch> {
+    let mesh = solution.mesh.view();
+    let mut radiosities = vec![vec![Rgb::BLACK; solution.lights.len()]; mesh.patches.len()];
+    for (element, id) in mesh.elements.iter().zip(0..) {
+        let patch = element.patch as usize;
+        let share = element.reflectance * (element.area / mesh.patches[patch].area);
+        for (sum, value) in radiosities[patch].iter_mut().zip(solution.element(id)) {
+            *sum += share * *value;
+        }
+    }
+    let patches = (0..).zip(radiosities).filter_map(|(patch, radiosity)| {
+        let polygon = mesh.patch_polygon(patch)?;
+        Some(RadiantPatch {
+            shooter: Shooter::new(polygon),
+            size: polygon.longest_edge(),
+            radiosity,
+        })
+    });
+    patches.collect()
+}
+
 /// Direct irradiance of every element at unit emission, light inside.
 fn direct_of_elements(solution: &Solution, bvh: &Bvh, far: f32) -> Vec<Rgb> {
     let mesh = solution.mesh.view();
@@ -197,7 +274,7 @@ fn direct_of_elements(solution: &Solution, bvh: &Bvh, far: f32) -> Vec<Rgb> {
     };
     for face in mesh.faces {
         if let Some(emission) = face.emission {
-            filler.shooter(&mesh, &face.polygon, &mut row);
+            filler.lamp(&mesh, &face.polygon, &mut row);
             add(emission.light, emission.share, &row);
         }
     }

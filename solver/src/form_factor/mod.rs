@@ -99,12 +99,32 @@ impl Shooter {
     /// The form factor from a point with a unit normal to what it sees of the patch, in [0, 1].
     #[must_use]
     pub fn at_point(&self, point: Vec3, normal: Vec3, visibility: &impl Visibility) -> f32 {
+        self.exact_at_point(point, normal, visibility)
+            .unwrap_or_else(|| {
+                let samples = self.samples.iter().flatten().copied();
+                let samples: Vec<SamplePoint, 16> = samples.collect();
+                let factor = self.seen_from(point, normal, &samples, None, visibility);
+                factor.min(1.0)
+            })
+    }
+
+    /// The same; `None` where blockers are too many to be cut out.
+    #[must_use]
+    pub fn exact_at_point(
+        &self,
+        point: Vec3,
+        normal: Vec3,
+        visibility: &impl Visibility,
+    ) -> Option<f32> {
+        let (height, tolerance) = self.polygon.height(point);
+        if height <= tolerance {
+            return Some(0.0);
+        }
         let shaft = Shaft::from_point(point, normal, &self.polygon);
-        let blockers = blockers(&shaft, visibility);
-        let samples = self.samples.iter().flatten().copied();
-        let samples: Vec<SamplePoint, 16> = samples.collect();
-        let factor = self.seen_from(point, normal, &samples, blockers.as_deref(), visibility);
-        factor.min(1.0)
+        let blockers = blockers(&shaft, visibility)?;
+        let view = View::new(point, normal, &self.polygon);
+        let factor = view.exact(&self.polygon, &blockers)?;
+        Some(factor.clamp(0.0, 1.0))
     }
 
     /// The form factor from a point with a unit normal to the patch, unoccluded, in [0, 1].
@@ -132,11 +152,7 @@ impl Shooter {
         if height <= tolerance {
             return 0.0;
         }
-        let view = View {
-            point,
-            normal,
-            outline: above_horizon(point, normal, self.polygon.vertices()),
-        };
+        let view = View::new(point, normal, &self.polygon);
         let exact = blockers.and_then(|blockers| view.exact(&self.polygon, blockers));
         exact
             .unwrap_or_else(|| self.sampled(&view, samples, visibility))
@@ -187,6 +203,14 @@ struct View {
 }
 
 impl View {
+    fn new(point: Vec3, normal: Vec3, polygon: &Polygon) -> Self {
+        Self {
+            point,
+            normal,
+            outline: above_horizon(point, normal, polygon.vertices()),
+        }
+    }
+
     /// The factor of what is visible; `None` when the blockers are too many to be cut out.
     fn exact(&self, polygon: &Polygon, blockers: &[&Polygon]) -> Option<f32> {
         if blockers.is_empty() {
