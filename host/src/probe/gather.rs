@@ -44,6 +44,12 @@ const SETS: u32 = 32;
 /// By how much a point is drawn from its polygon's outline towards the middle, away from edges.
 const INWARDS: f32 = 1e-5;
 
+/// The same for the end of a ray, whose place matters less than that no light comes around an edge.
+const END_INWARDS: f32 = 1e-3;
+
+/// How often a point of a lamp is looked for above the horizon.
+const TRIES: u64 = 8;
+
 /// A point on a side of a surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Spot {
@@ -187,7 +193,7 @@ impl<'a> Gatherer<'a> {
 
     fn place(&self, outline: &Polygon, position: Vec3) -> Spot {
         Spot {
-            position: position + (outline.center() - position) * INWARDS,
+            position: position + (outline.center() - position) * END_INWARDS,
             normal: outline.normal(),
         }
     }
@@ -201,11 +207,16 @@ impl<'a> Gatherer<'a> {
     /// Direct irradiance by one shadow ray to each lamp and luminaire; the sky's as the element has it.
     fn direct_at(&self, Spot { position, normal }: Spot, seed: u64) -> Vec<Rgb> {
         let mut values = vec![Rgb::BLACK; self.solution.lights.len()];
-        let at = Vec2::new(noise::unit(2 * seed), noise::unit(2 * seed + 1));
         for (lamp, emission) in &self.lamps {
             let factor = lamp.open_at_point(position, normal);
-            let (on_lamp, _) = from_unit_square(lamp.polygon(), at);
-            if factor > 0.0 && self.bvh.sees(position, on_lamp) {
+            let is_above = |point: &Vec3| (*point - position).dot(normal) > 0.0;
+            let points = (0..TRIES).map(|index| {
+                let seed = 2 * (seed * TRIES + index);
+                let at = Vec2::new(noise::unit(seed), noise::unit(seed + 1));
+                from_unit_square(lamp.polygon(), at).0
+            });
+            let is_seen = |point| self.bvh.sees(position, point);
+            if factor > 0.0 && points.into_iter().find(is_above).is_some_and(is_seen) {
                 values[emission.light as usize] += emission.share * factor;
             }
         }
