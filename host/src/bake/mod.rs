@@ -6,6 +6,7 @@
 
 mod bounce;
 mod direct;
+mod estimate;
 mod shoot;
 
 use std::ops::ControlFlow;
@@ -220,7 +221,7 @@ struct Solved {
     direct: Option<Vec<Rgb>>,
     /// One for each light.
     residuals: Vec<f32>,
-    /// Estimated relative L1 error of each light.
+    /// Relative L1 error of each light that rays or missing rows leave, estimated.
     errors: Vec<f32>,
     rows: u32,
 }
@@ -241,7 +242,11 @@ fn check_memory(mesh: &OwnedMesh, lights: usize, settings: &Settings) -> Result<
 }
 
 fn solution(scene: &OwnedScene, method: Method, spacing: Spacing, solved: Solved) -> Solution {
-    let lights = scene.lights.iter().zip(solved.residuals).zip(solved.errors);
+    let count = scene.lights.len();
+    let mesh_errors = estimate::mesh_errors(&solved.mesh, &solved.contributions, count);
+    let errors = solved.errors.iter().zip(mesh_errors);
+    let errors = errors.map(|(sampling, mesh)| sampling.hypot(mesh));
+    let lights = scene.lights.iter().zip(solved.residuals).zip(errors);
     Solution {
         surfaces: scene.surfaces.iter().map(|s| *s.polygon()).collect(),
         luminaires: scene.luminaires.clone(),

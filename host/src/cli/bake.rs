@@ -133,7 +133,7 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
 
     let solution = &baked.solution;
     let lights = solution.lights.iter().map(|light| {
-        json!({"name": light.name, "emission": light.emission.to_array(), "residual": light.residual})
+        json!({"name": light.name, "emission": light.emission.to_array(), "residual": light.residual, "error": light.error})
     });
     Ok(Outcome {
         interrupted: baked.interrupted,
@@ -150,6 +150,7 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
             "element": solution.spacing.element,
             "shots": solution.rows,
             "residual": baked.residual(),
+            "error": baked.error(),
             "method": arguments.settings().method.name(),
             "seconds": baked.time.as_secs_f64(),
             "interrupted": baked.interrupted,
@@ -171,6 +172,12 @@ impl Baked {
     pub fn residual(&self) -> f32 {
         let residuals = self.solution.lights.iter().map(|light| light.residual);
         residuals.fold(0.0, f32::max)
+    }
+
+    /// The largest estimated error of all lights.
+    pub fn error(&self) -> f32 {
+        let errors = self.solution.lights.iter().map(|light| light.error);
+        errors.fold(0.0, f32::max)
     }
 
     /// Names of the lights that have shot their share and reached nothing.
@@ -255,12 +262,14 @@ fn report(baked: &Baked, file: &str, bytes: usize) {
         tell!("interrupted: this is what --shots {} gives", solution.rows);
     }
     tell!(
-        "{file}: {} elements, {} patches, {} lights, {} rows, residual {:.2e}, {:.2} s, {}",
+        "{file}: {} elements, {} patches, {} lights, {} rows, residual {:.1e}, estimated error {:.1} %, \
+         {:.2} s, {}",
         solution.mesh.elements.len(),
         solution.mesh.patches.len(),
         solution.lights.len(),
         solution.rows,
         baked.residual(),
+        100.0 * baked.error(),
         baked.time.as_secs_f64(),
         human_bytes(bytes),
     );

@@ -33,6 +33,7 @@ fn of_solution(solution: &Solution) -> Value {
             "name": light.name,
             "emission": light.emission.to_array(),
             "residual": light.residual,
+            "error": light.error,
         })
     });
     json!({
@@ -45,6 +46,7 @@ fn of_solution(solution: &Solution) -> Value {
         "patch": solution.spacing.patch,
         "element": solution.spacing.element,
         "shots": solution.rows,
+        "method": solution.method.name(),
         "split_direct": solution.direct.is_some(),
         "lights": solution.lights.len(),
         "per_light": lights.collect::<Vec<_>>(),

@@ -46,7 +46,8 @@ pub struct SolutionLight {
     pub emission: Rgb,
     /// Unshot over emitted power when the bake ended.
     pub residual: f32,
-    /// Estimated relative L1 error of its irradiance, as far as the bake can tell.
+    /// Estimated relative L1 error of its irradiance at points of the elements: what rays or missing
+    /// rows leave, and the size of the elements.
     pub error: f32,
 }
 
