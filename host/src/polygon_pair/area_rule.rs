@@ -9,43 +9,81 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::polygon::{bilinear, cells};
+use super::polygon::{ROUNDINGS, bilinear, cells};
 use super::rules::{GAUSS, Rule};
 use super::{Estimate, Face};
 
-/// Largest `(R_1 + R_2) / d` for which the rules are tried at all.
+/// Largest `(R_1 + R_2) / d` for which the rules are tried.
 const FAR: f64 = 0.65;
+
+/// Two rules may agree by chance: an error is at least this share of the difference one rule before.
+const CHANCE: f64 = 0.02;
+
+/// Parts that are so much smaller than the polygons and still near each other touch.
+const TOUCH: f64 = 1e-6;
+
+/// Most pairs of parts that [`divided`] makes of one pair: some milliseconds.
+const PARTS: usize = 4000;
 
 /// `A_1 F_12` with its error, or `None` for a pair that is not far enough to get below `tolerance`
 /// (relative) with the finest rule.
 ///
-/// Each polygon lies in front of the other one. The error is the difference from the next coarser rule.
+/// Each polygon lies in front of the other one.
 pub(super) fn integrate(from: &Face, to: &Face, tolerance: f64) -> Option<Estimate> {
-    let nearness = nearness(from, to);
-    if nearness > FAR {
+    if nearness(from, to) > FAR {
         return None;
     }
-    let first = if nearness < 0.15 { 0 } else { 1 };
-    let mut coarse = double_sum(from, to, GAUSS[first]);
-    for rule in &GAUSS[first + 1..] {
-        let fine = double_sum(from, to, rule);
-        let error = (fine - coarse).abs();
-        if error <= tolerance * fine {
-            return Some(Estimate { value: fine, error });
+    let mut sums = [
+        double_sum(from, to, GAUSS[0]),
+        double_sum(from, to, GAUSS[1]),
+    ];
+    for rule in &GAUSS[2..] {
+        let [coarsest, coarse] = sums;
+        let value = double_sum(from, to, rule);
+        let error = (value - coarse).abs() + CHANCE * (coarse - coarsest).abs();
+        if error <= tolerance * value {
+            let error = error + rounding(from, to) * value;
+            return Some(Estimate { value, error });
         }
-        coarse = fine;
+        sums = [coarse, value];
     }
     None
 }
 
+/// The same for a pair that is apart but wide: the wider one is halved until all parts are far.
+///
+/// `None` for pairs that touch, or are so close that this takes too many parts.
+pub(super) fn divided(from: &Face, to: &Face, tolerance: f64) -> Option<Estimate> {
+    let smallest = TOUCH * (from.radius() + to.radius());
+    let mut waiting = vec![[from.clone(), to.clone()]];
+    let mut sum = Estimate::default();
+    for _ in 0..PARTS {
+        let Some([from, to]) = waiting.pop() else {
+            return Some(sum);
+        };
+        if let Some(part) = integrate(&from, &to, tolerance) {
+            sum.value += part.value;
+            sum.error += part.error;
+        } else if from.radius() + to.radius() < smallest {
+            return None;
+        } else if from.radius() > to.radius() {
+            waiting.extend(from.halves().map(|half| [half, to.clone()]));
+        } else {
+            waiting.extend(to.halves().map(|half| [from.clone(), half]));
+        }
+    }
+    None
+}
+
+/// Relative error by rounding: that of the heights above each other, of which the cosines are made.
+fn rounding(from: &Face, to: &Face) -> f64 {
+    let (a, b) = (from.middle(), to.middle());
+    4.0 * ROUNDINGS * a.distance(b) * (1.0 / from.height(b) + 1.0 / to.height(a))
+}
+
 /// `(R_1 + R_2) / d`: the radii about the middles over the distance of the middles.
 fn nearness(from: &Face, to: &Face) -> f64 {
-    let radius = |face: &Face, middle: DVec3| {
-        let squares = face.outline.iter().map(|v| v.distance_squared(middle));
-        squares.fold(0.0, f64::max).sqrt()
-    };
-    let (a, b) = (from.middle(), to.middle());
-    (radius(from, a) + radius(to, b)) / a.distance(b)
+    (from.radius() + to.radius()) / from.middle().distance(to.middle())
 }
 
 fn double_sum(from: &Face, to: &Face, rule: Rule) -> f64 {

@@ -30,6 +30,9 @@ use super::rules::{FINEST, PATTERSON_POINTS, patterson_indices, patterson_node, 
 /// A singularity counts as near when it is closer than this share of the panel's length.
 const NEAR: f64 = 0.3;
 
+/// Two rules may agree by chance: an error is at least this share of the difference one level before.
+const CHANCE: f64 = 1e-3;
+
 /// Most rounds of refinement: a round at least halves the panels that are not good enough.
 const ROUNDS: usize = 40;
 
@@ -87,7 +90,7 @@ fn total(panels: &[Panel]) -> (f64, f64) {
 
 /// What the roundings of all terms may add up to: terms are far larger than their sum.
 fn rounding(panels: &[Panel]) -> f64 {
-    4.0 * f64::EPSILON * panels.iter().map(|panel| panel.magnitude).sum::<f64>()
+    8.0 * f64::EPSILON * panels.iter().map(|panel| panel.magnitude).sum::<f64>()
 }
 
 /// Takes the next rule on panels that err by more than `share`, and halves those that have the last.
@@ -290,8 +293,14 @@ impl<'a> Panel<'a> {
             self.magnitudes = f64::max(self.magnitudes, magnitude);
         }
         let half = length / 2.0;
-        self.value = half * patterson_sum(self.level, &self.values);
-        self.error = (self.value - half * patterson_sum(self.level - 1, &self.values)).abs();
+        let sum = |level: usize| half * patterson_sum(level, &self.values);
+        self.value = sum(self.level);
+        let before = sum(self.level - 1);
+        let last = (self.value - before).abs();
+        self.error = match self.level {
+            1 => last,
+            level => last.max(CHANCE * (before - sum(level - 2)).abs()),
+        };
         self.magnitude = length * self.magnitudes;
     }
 }

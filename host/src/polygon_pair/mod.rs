@@ -73,8 +73,7 @@ pub fn form_factor(
         return Estimate::default();
     };
 
-    let open = area_rule::integrate(&from, &to, OPEN_TOLERANCE)
-        .unwrap_or_else(|| contour::integrate(&from.outline, &to.outline, OPEN_TOLERANCE));
+    let open = open(&from, &to);
     let power = if blockers.is_empty() {
         open
     } else {
@@ -84,6 +83,22 @@ pub fn form_factor(
         value: (power.value / area).clamp(0.0, 1.0),
         error: power.error / area,
     }
+}
+
+/// `A_1 F_12` without blockers.
+fn open(from: &Face, to: &Face) -> Estimate {
+    if let Some(far) = area_rule::integrate(from, to, OPEN_TOLERANCE) {
+        return far;
+    }
+    let near = contour::integrate(&from.outline, &to.outline, OPEN_TOLERANCE);
+    if near.error <= OPEN_TOLERANCE * near.value {
+        return near;
+    }
+    // The contour's terms cancel where both are slender or low beside their distance; areas do not.
+    let divided = area_rule::divided(from, to, OPEN_TOLERANCE);
+    divided
+        .filter(|divided| divided.error < near.error)
+        .unwrap_or(near)
 }
 
 /// `A_1 F_12` behind blockers, `open` being the same without.
@@ -140,6 +155,26 @@ impl Face {
     /// Mean of the vertices.
     fn middle(&self) -> DVec3 {
         self.outline.iter().sum::<DVec3>() / self.outline.len() as f64
+    }
+
+    /// Distance of the farthest vertex from the middle.
+    fn radius(&self) -> f64 {
+        let middle = self.middle();
+        let squares = self.outline.iter().map(|v| v.distance_squared(middle));
+        squares.fold(0.0, f64::max).sqrt()
+    }
+
+    /// The parts on both sides of the middle, across the direction of the farthest vertex.
+    fn halves(&self) -> [Self; 2] {
+        let middle = self.middle();
+        let reach = |v: &DVec3| v.distance_squared(middle);
+        let vertices = self.outline.iter().copied();
+        let farthest = vertices.max_by(|a, b| reach(a).total_cmp(&reach(b)));
+        let across = farthest.unwrap_or(middle) - middle;
+        [across, -across].map(|across| Self {
+            outline: clip(&self.outline, 0.0, |v| across.dot(v - middle)),
+            normal: self.normal,
+        })
     }
 }
 
