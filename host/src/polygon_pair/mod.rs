@@ -33,6 +33,8 @@ mod contour;
 
 mod shadow;
 
+mod events;
+
 mod occluded;
 
 use glam::DVec3;

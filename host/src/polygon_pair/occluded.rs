@@ -20,7 +20,8 @@ use std::collections::BinaryHeap;
 
 use glam::DVec3;
 
-use super::polygon::{Cell, bilinear, cells, clip, edges};
+use super::events::{Event, events};
+use super::polygon::{Cell, bilinear, cells};
 use super::rules::{GAUSS, Rule};
 use super::shadow::{Blocker, View};
 use super::{Estimate, Face};
@@ -31,14 +32,23 @@ const CELLS: usize = 4000;
 /// Most parts that lines divide the domain into.
 const PARTS: usize = 64;
 
-/// Sines and distances (in units of the pair's size) below this are none.
-const PARALLEL: f64 = 1e-9;
+/// Lengths below this share of the domain's radius are none.
+const GRAIN: f64 = 1e-10;
+
+/// A cell that sees all or nothing beside an event is halved down to this share of the domain's radius.
+const BLIND: f64 = 0.125;
 
 /// Visible shares of the open form factor below this are roundings: nothing is seen.
 const NOTHING: f64 = 1e-12;
 
 /// A cell may be so many times as wide as the smallest footprint in it.
 const COARSEST: f64 = 3.0;
+
+/// Error of a cell with an event inside, in units of its second and third Legendre coefficients.
+const CROSSED: f64 = 0.05;
+
+/// The same in units of the third, for cells where curved events of several blockers may hide.
+const SHARED: f64 = 0.0;
 
 const COARSE: Rule = GAUSS[1];
 const FINE: Rule = GAUSS[2];
@@ -54,15 +64,15 @@ pub(super) fn integrate(
     open: Estimate,
     tolerance: f64,
 ) -> Estimate {
+    let mesh = Mesh::new(domain, target, blockers);
     let mut view = View::new(domain.normal, &target.outline, blockers);
     let mut queue: Vec<Patch> = Vec::new();
-    for part in divided(domain, target, blockers) {
-        for cell in cells(&part) {
-            resolve(cell, blockers, &mut |cell| {
-                queue.push(Patch::new(cell, &mut view))
-            });
-        }
-    }
+    let all: Vec<usize> = (0..mesh.events.len()).collect();
+    mesh.divide(&domain.outline, &all, &mut |cell, events| {
+        mesh.resolve(cell, events, &mut |cell, events| {
+            queue.push(Patch::new(cell, events, &mesh, &mut view))
+        });
+    });
     let mut sums = Sums::default();
     queue.iter().for_each(|patch| sums.add(patch, 1.0));
     let by_hidden = sums.hidden.error + open.error < sums.visible.error;
@@ -70,14 +80,15 @@ pub(super) fn integrate(
 
     let mut queue = BinaryHeap::from(queue);
     let mut found = sums.result(open);
-    while found.error > tolerance * found.value && queue.len() < CELLS {
+    let mut evaluated = queue.len();
+    while found.error > tolerance * found.value && evaluated < CELLS {
         let Some(worst) = queue.pop() else { break };
         sums.add(&worst, -1.0);
-        for half in halves(worst.cell, worst.is_rough_along_s) {
-            let mut patch = Patch::new(half, &mut view);
+        for mut patch in worst.refined(&mesh, &mut view) {
             patch.rank(by_hidden);
             sums.add(&patch, 1.0);
             queue.push(patch);
+            evaluated += 1;
         }
         found = sums.result(open);
     }
@@ -125,6 +136,8 @@ impl Sums {
 /// A cell of the domain with its share of the integrals.
 struct Patch {
     cell: Cell,
+    /// Events that show inside.
+    events: Vec<usize>,
     visible: Estimate,
     hidden: Estimate,
     is_rough_along_s: bool,
@@ -133,20 +146,45 @@ struct Patch {
 }
 
 impl Patch {
-    fn new(cell: Cell, view: &mut View) -> Self {
+    fn new(cell: Cell, events: Vec<usize>, mesh: &Mesh, view: &mut View) -> Self {
         let (fine, samples) = product(&cell, FINE, view);
         let (coarse, _) = product(&cell, COARSE, view);
+        let rough = [roughness(&samples, 4, 1), roughness(&samples, 1, 4)];
+        let second = rough[0].0 + rough[1].0;
+        let third = rough[0].1 + rough[1].1;
+        let extra = if !events.is_empty() {
+            CROSSED * (second + third)
+        } else if mesh.is_shared(&cell) {
+            SHARED * third
+        } else {
+            0.0
+        };
         let [visible, hidden] = [0, 1].map(|k| Estimate {
             value: fine[k],
-            error: (fine[k] - coarse[k]).abs(),
+            error: (fine[k] - coarse[k]).abs() + if fine[k] != 0.0 { extra } else { 0.0 },
         });
         Self {
             cell,
+            events,
             visible,
             hidden,
-            is_rough_along_s: roughness(&samples, 4, 1) > roughness(&samples, 1, 4),
+            is_rough_along_s: rough[0].0 + rough[0].1 > rough[1].0 + rough[1].1,
             urgency: 0.0,
         }
+    }
+
+    /// The cell in parts: along an event inside, or halved.
+    fn refined(self, mesh: &Mesh, view: &mut View) -> Vec<Patch> {
+        let mut parts = Vec::with_capacity(2);
+        mesh.refine(
+            self.cell,
+            &self.events,
+            self.is_rough_along_s,
+            &mut |cell, events| {
+                parts.push(Patch::new(cell, events, mesh, view));
+            },
+        );
+        parts
     }
 
     fn rank(&mut self, by_hidden: bool) {
@@ -158,7 +196,7 @@ impl Patch {
     }
 }
 
-/// Integrals of the visible and the hidden form factor over a cell, and the visible one at the nodes.
+/// Integrals of the visible and the hidden form factor over a cell, and the visible one's samples.
 fn product(cell: &Cell, rule: Rule, view: &mut View) -> ([f64; 2], [f64; 16]) {
     let (mut sums, mut samples) = ([0.0; 2], [0.0; 16]);
     for (i, (s, weight_s)) in rule.iter().enumerate() {
@@ -168,23 +206,23 @@ fn product(cell: &Cell, rule: Rule, view: &mut View) -> ([f64; 2], [f64; 16]) {
             let weight = weight_s * weight_t * density;
             sums[0] += weight * (whole - hidden);
             sums[1] += weight * hidden;
-            samples[rule.len() * i + j] = whole - hidden;
+            samples[rule.len() * i + j] = hidden * density;
         }
     }
     (sums, samples)
 }
 
-/// The parts of second and third degree along a direction of the 4 x 4 samples.
+/// Mean absolute coefficients of Legendre's second and third polynomial along a direction of the 4 x 4 samples.
 ///
-/// `along` and `across` are the steps from one sample to the next; sums with the Gauss weights and
-/// Legendre's polynomials, up to a common factor.
-fn roughness(samples: &[f64; 16], along: usize, across: usize) -> f64 {
-    (0..4)
-        .map(|line| {
-            let [a, b, c, d] = [0, 1, 2, 3].map(|k| samples[line * across + k * along]);
-            ((a + d) - (b + c)).abs() + ((d - a) / 2.532_6 - (c - b)).abs()
-        })
-        .sum()
+/// `along` and `across` are the steps from one sample to the next; sums with the Gauss weights.
+fn roughness(samples: &[f64; 16], along: usize, across: usize) -> (f64, f64) {
+    let mut sums = (0.0, 0.0);
+    for line in 0..4 {
+        let [a, b, c, d] = [0, 1, 2, 3].map(|k| samples[line * across + k * along]);
+        sums.0 += 0.532_5 * ((a + d) - (b + c)).abs() / 4.0;
+        sums.1 += 0.371_1 * ((d - a) - 2.532_6 * (c - b)).abs() / 4.0;
+    }
+    sums
 }
 
 impl PartialEq for Patch {
@@ -218,78 +256,129 @@ fn halves([a, b, c, d]: Cell, along_s: bool) -> [Cell; 2] {
     }
 }
 
-/// Halves a cell until no small footprint can slip through between its nodes.
-fn resolve(cell: Cell, blockers: &[Blocker], found: &mut impl FnMut(Cell)) {
-    let [a, b, c, d] = cell;
-    let (width, height) = (
-        a.distance(b).max(c.distance(d)),
-        a.distance(d).max(b.distance(c)),
-    );
-    let is_coarse = blockers.iter().any(|blocker| {
-        let first = blocker.footprint[0];
-        let (low, high) = blocker
-            .footprint
+/// What cells are divided by.
+struct Mesh<'a> {
+    normal: DVec3,
+    events: Vec<Event>,
+    blockers: &'a [Blocker],
+    radius: f64,
+    grain: f64,
+}
+
+impl<'a> Mesh<'a> {
+    fn new(domain: &Face, target: &Face, blockers: &'a [Blocker]) -> Self {
+        let radius = domain.radius();
+        Self {
+            normal: domain.normal,
+            events: events(domain, target, blockers),
+            blockers,
+            radius,
+            grain: GRAIN * radius,
+        }
+    }
+
+    /// Hands out the cells of an outline that is divided along all strong events.
+    fn divide(
+        &self,
+        outline: &[DVec3],
+        events: &[usize],
+        found: &mut impl FnMut(Cell, Vec<usize>),
+    ) {
+        let crossing = self.crossing(outline, events);
+        let mut strong = crossing.iter().filter(|k| self.events[**k].is_strong);
+        match strong.find_map(|k| self.split(outline, *k)) {
+            Some((parts, by)) => {
+                let rest: Vec<usize> = crossing.into_iter().filter(|k| *k != by).collect();
+                for part in &parts {
+                    self.divide(part, &rest, found);
+                }
+            }
+            None => self.cut(outline, &crossing, found),
+        }
+    }
+
+    /// Hands out the parts of a cell: along an event inside, or halves.
+    fn refine(
+        &self,
+        cell: Cell,
+        events: &[usize],
+        along_s: bool,
+        found: &mut impl FnMut(Cell, Vec<usize>),
+    ) {
+        match events.iter().find_map(|k| self.split(&cell, *k)) {
+            Some((parts, by)) => {
+                let rest: Vec<usize> = events.iter().copied().filter(|k| *k != by).collect();
+                parts.iter().for_each(|part| self.cut(part, &rest, found));
+            }
+            None => {
+                for half in halves(cell, along_s) {
+                    found(half, self.crossing(&half, events));
+                }
+            }
+        }
+    }
+
+    /// The two sides of an event, with its number; `None` where it leaves the outline whole.
+    fn split(&self, outline: &[DVec3], by: usize) -> Option<([Vec<DVec3>; 2], usize)> {
+        let parts = self.events[by].split(outline, self.normal, self.grain);
+        let is_split = parts.iter().all(|part| !part.is_empty());
+        is_split.then_some((parts, by))
+    }
+
+    /// Hands out the cells of an outline.
+    fn cut(&self, outline: &[DVec3], events: &[usize], found: &mut impl FnMut(Cell, Vec<usize>)) {
+        for cell in cells(outline) {
+            found(cell, self.crossing(&cell, events));
+        }
+    }
+
+    /// Those of some events that show inside an outline.
+    fn crossing(&self, outline: &[DVec3], events: &[usize]) -> Vec<usize> {
+        let crosses = |k: &usize| self.events[*k].crosses(outline, self.normal, self.grain);
+        events.iter().copied().filter(crosses).collect()
+    }
+
+    /// Halves a cell until no small footprint can slip through between its nodes.
+    fn resolve(&self, cell: Cell, events: Vec<usize>, found: &mut impl FnMut(Cell, Vec<usize>)) {
+        let [a, b, c, d] = cell;
+        let (width, height) = (
+            a.distance(b).max(c.distance(d)),
+            a.distance(d).max(b.distance(c)),
+        );
+        let box_of_cell = bounds(&cell);
+        let is_coarse = self.blockers.iter().any(|blocker| {
+            let footprint = bounds(&blocker.footprint);
+            meet(box_of_cell, footprint)
+                && width.max(height) > COARSEST * footprint[0].distance(footprint[1])
+        });
+        if is_coarse {
+            for half in halves(cell, width > height) {
+                let events = self.crossing(&half, &events);
+                self.resolve(half, events, found);
+            }
+        } else {
+            found(cell, events);
+        }
+    }
+
+    /// True when several blockers may act in a cell.
+    fn is_shared(&self, cell: &Cell) -> bool {
+        let cell = bounds(cell);
+        let acting = self
+            .blockers
             .iter()
-            .fold((first, first), |(low, high), v| (low.min(*v), high.max(*v)));
-        let (cell_low, cell_high) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
-        let is_apart = low.cmpgt(cell_high).any() || high.cmplt(cell_low).any();
-        !is_apart && width.max(height) > COARSEST * low.distance(high)
-    });
-    if is_coarse {
-        for half in halves(cell, width > height) {
-            resolve(half, blockers, found);
-        }
-    } else {
-        found(cell);
+            .filter(|b| meet(cell, bounds(&b.footprint)));
+        acting.count() > 1
     }
 }
 
-/// The domain, divided along the lines of strong kinks.
-fn divided(domain: &Face, target: &Face, blockers: &[Blocker]) -> Vec<Vec<DVec3>> {
-    let mut parts = vec![domain.outline.clone()];
-    for (point, normal) in kinks(target, blockers) {
-        if parts.len() >= PARTS {
-            break;
-        }
-        let split = |part: Vec<DVec3>| {
-            let front = clip(&part, PARALLEL, |v| normal.dot(v - point));
-            let back = clip(&part, PARALLEL, |v| -normal.dot(v - point));
-            if front.is_empty() || back.is_empty() {
-                vec![part]
-            } else {
-                vec![front, back]
-            }
-        };
-        parts = parts.into_iter().flat_map(split).collect();
-    }
-    parts
+/// Lowest and highest coordinates.
+fn bounds(outline: &[DVec3]) -> [DVec3; 2] {
+    let first = outline[0];
+    let extend = |[low, high]: [DVec3; 2], v: &DVec3| [low.min(*v), high.max(*v)];
+    outline.iter().fold([first, first], extend)
 }
 
-/// Planes, as a point and a unit normal, beyond which the integrand continues with a strong kink.
-fn kinks(target: &Face, blockers: &[Blocker]) -> Vec<(DVec3, DVec3)> {
-    let own = blockers.iter().map(|b| (b.face.outline[0], b.face.normal));
-    let mut planes: Vec<(DVec3, DVec3)> = own.collect();
-    for (k, blocker) in blockers.iter().enumerate() {
-        let others = blockers[..k].iter().map(|b| &b.face);
-        for other in others.chain([target]) {
-            planes.extend(parallels(&blocker.face.outline, &other.outline));
-        }
-    }
-    planes
-}
-
-/// Planes through parallel edges of two outlines.
-fn parallels(first: &[DVec3], second: &[DVec3]) -> Vec<(DVec3, DVec3)> {
-    let mut planes = Vec::new();
-    for (a, b) in edges(first) {
-        let along = (b - a).normalize();
-        for (c, d) in edges(second) {
-            let normal = along.cross(c - a);
-            let is_parallel = along.cross((d - c).normalize()).length() < PARALLEL;
-            if is_parallel && normal.length() > PARALLEL {
-                planes.push((a, normal.normalize()));
-            }
-        }
-    }
-    planes
+fn meet([a_low, a_high]: [DVec3; 2], [b_low, b_high]: [DVec3; 2]) -> bool {
+    a_low.cmple(b_high).all() && b_low.cmple(a_high).all()
 }
