@@ -126,18 +126,28 @@ fn behind(
         let heights = clipped.iter().map(|b| face.height(b.middle()));
         heights.fold(f64::INFINITY, f64::min) / vector_area(&face.outline).length().sqrt()
     };
-    let (domain, target) = if clearance(to) > clearance(from) {
-        (to, from)
-    } else {
-        (from, to)
-    };
+    let (domain, target) =
+        if (clearance(to) > clearance(from)) != std::env::var_os("SWAP").is_some() {
+            (to, from)
+        } else {
+            (from, to)
+        };
     let blockers = clipped.into_iter();
     let blockers = blockers.filter_map(|face| Blocker::new(face, domain, target, frame.grain));
     let blockers: Vec<Blocker> = blockers.collect();
     if blockers.is_empty() {
         return open;
     }
-    occluded::integrate(domain, target, &blockers, open, OCCLUDED_TOLERANCE)
+    occluded::integrate(
+        domain,
+        target,
+        &blockers,
+        open,
+        std::env::var("TOL")
+            .ok()
+            .and_then(|t| t.parse().ok())
+            .unwrap_or(OCCLUDED_TOLERANCE),
+    )
 }
 
 /// A convex outline in the local frame.

@@ -21,7 +21,7 @@ use std::collections::BinaryHeap;
 use glam::DVec3;
 
 use super::events::{Event, events};
-use super::polygon::{Cell, bilinear, cells};
+use super::polygon::{Cell, ROUNDINGS, bilinear, bounds, cells, diagonal, gap, meet};
 use super::rules::{GAUSS, Rule};
 use super::shadow::{Blocker, View};
 use super::{Estimate, Face};
@@ -29,14 +29,8 @@ use super::{Estimate, Face};
 /// Most cells: a few hundredths of a second.
 const CELLS: usize = 4000;
 
-/// Most parts that lines divide the domain into.
-const PARTS: usize = 64;
-
 /// Lengths below this share of the domain's radius are none.
 const GRAIN: f64 = 1e-10;
-
-/// A cell that sees all or nothing beside an event is halved down to this share of the domain's radius.
-const BLIND: f64 = 0.125;
 
 /// Visible shares of the open form factor below this are roundings: nothing is seen.
 const NOTHING: f64 = 1e-12;
@@ -44,8 +38,17 @@ const NOTHING: f64 = 1e-12;
 /// A cell may be so many times as wide as the smallest footprint in it.
 const COARSEST: f64 = 3.0;
 
+/// A cell may be so many times as long as wide, unless blockers and target are farther than its length.
+const SLENDER: f64 = 4.0;
+
+/// Most halvings on account of the two.
+const HALVINGS: usize = 10;
+
 /// Error of a cell with an event inside, in units of its second and third Legendre coefficients.
 const CROSSED: f64 = 0.05;
+
+/// The same in units of the open form factor: events may bound a shadow or an opening that all nodes miss.
+const BLIND: f64 = 1e-3;
 
 /// The same in units of the third, for cells where curved events of several blockers may hide.
 const SHARED: f64 = 0.0;
@@ -69,7 +72,7 @@ pub(super) fn integrate(
     let mut queue: Vec<Patch> = Vec::new();
     let all: Vec<usize> = (0..mesh.events.len()).collect();
     mesh.divide(&domain.outline, &all, &mut |cell, events| {
-        mesh.resolve(cell, events, &mut |cell, events| {
+        mesh.resolve(cell, events, HALVINGS, &mut |cell, events| {
             queue.push(Patch::new(cell, events, &mesh, &mut view))
         });
     });
@@ -153,7 +156,7 @@ impl Patch {
         let second = rough[0].0 + rough[1].0;
         let third = rough[0].1 + rough[1].1;
         let extra = if !events.is_empty() {
-            CROSSED * (second + third)
+            CROSSED * (second + third) + BLIND * (fine[0] + fine[1])
         } else if mesh.is_shared(&cell) {
             SHARED * third
         } else {
@@ -161,7 +164,7 @@ impl Patch {
         };
         let [visible, hidden] = [0, 1].map(|k| Estimate {
             value: fine[k],
-            error: (fine[k] - coarse[k]).abs() + if fine[k] != 0.0 { extra } else { 0.0 },
+            error: (fine[k] - coarse[k]).abs() + extra,
         });
         Self {
             cell,
@@ -261,19 +264,18 @@ struct Mesh<'a> {
     normal: DVec3,
     events: Vec<Event>,
     blockers: &'a [Blocker],
-    radius: f64,
+    target_bounds: [DVec3; 2],
     grain: f64,
 }
 
 impl<'a> Mesh<'a> {
     fn new(domain: &Face, target: &Face, blockers: &'a [Blocker]) -> Self {
-        let radius = domain.radius();
         Self {
             normal: domain.normal,
             events: events(domain, target, blockers),
             blockers,
-            radius,
-            grain: GRAIN * radius,
+            target_bounds: bounds(&target.outline),
+            grain: GRAIN * domain.radius() + ROUNDINGS,
         }
     }
 
@@ -312,7 +314,8 @@ impl<'a> Mesh<'a> {
             }
             None => {
                 for half in halves(cell, along_s) {
-                    found(half, self.crossing(&half, events));
+                    // Events that cannot be split off lie along the border.
+                    found(half, Vec::new());
                 }
             }
         }
@@ -338,23 +341,33 @@ impl<'a> Mesh<'a> {
         events.iter().copied().filter(crosses).collect()
     }
 
-    /// Halves a cell until no small footprint can slip through between its nodes.
-    fn resolve(&self, cell: Cell, events: Vec<usize>, found: &mut impl FnMut(Cell, Vec<usize>)) {
+    /// Halves a cell until no small footprint and no layer along a near edge can slip through its nodes.
+    fn resolve(
+        &self,
+        cell: Cell,
+        events: Vec<usize>,
+        depth: usize,
+        found: &mut impl FnMut(Cell, Vec<usize>),
+    ) {
         let [a, b, c, d] = cell;
         let (width, height) = (
             a.distance(b).max(c.distance(d)),
             a.distance(d).max(b.distance(c)),
         );
-        let box_of_cell = bounds(&cell);
+        let (long, short) = (width.max(height), width.min(height));
+        let extent = bounds(&cell);
         let is_coarse = self.blockers.iter().any(|blocker| {
-            let footprint = bounds(&blocker.footprint);
-            meet(box_of_cell, footprint)
-                && width.max(height) > COARSEST * footprint[0].distance(footprint[1])
+            meet(extent, blocker.footprint_bounds)
+                && long > COARSEST * diagonal(blocker.footprint_bounds)
         });
-        if is_coarse {
+        let is_slender = long > SLENDER * short && {
+            let near = |other: [DVec3; 2]| gap(extent, other) < long;
+            near(self.target_bounds) && self.blockers.iter().any(|b| near(b.bounds))
+        };
+        if depth > 0 && (is_coarse || is_slender) {
             for half in halves(cell, width > height) {
                 let events = self.crossing(&half, &events);
-                self.resolve(half, events, found);
+                self.resolve(half, events, depth - 1, found);
             }
         } else {
             found(cell, events);
@@ -367,18 +380,7 @@ impl<'a> Mesh<'a> {
         let acting = self
             .blockers
             .iter()
-            .filter(|b| meet(cell, bounds(&b.footprint)));
+            .filter(|b| meet(cell, b.footprint_bounds));
         acting.count() > 1
     }
-}
-
-/// Lowest and highest coordinates.
-fn bounds(outline: &[DVec3]) -> [DVec3; 2] {
-    let first = outline[0];
-    let extend = |[low, high]: [DVec3; 2], v: &DVec3| [low.min(*v), high.max(*v)];
-    outline.iter().fold([first, first], extend)
-}
-
-fn meet([a_low, a_high]: [DVec3; 2], [b_low, b_high]: [DVec3; 2]) -> bool {
-    a_low.cmple(b_high).all() && b_low.cmple(a_high).all()
 }

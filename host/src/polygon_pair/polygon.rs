@@ -200,3 +200,31 @@ pub(super) fn bilinear(cell: &Cell, normal: DVec3, s: f64, t: f64) -> (DVec3, f6
     let point = a + (b - a) * s + (d - a) * t + twist * (s * t);
     (point, along_s.cross(along_t).dot(normal))
 }
+
+/// Lowest and highest coordinates.
+pub(super) type Bounds = [DVec3; 2];
+
+/// The box around an outline of at least one vertex.
+pub(super) fn bounds(outline: &[DVec3]) -> Bounds {
+    let first = outline[0];
+    let extend = |[low, high]: Bounds, v: &DVec3| [low.min(*v), high.max(*v)];
+    outline.iter().fold([first, first], extend)
+}
+
+/// True when two boxes have a point in common.
+pub(super) fn meet([a_low, a_high]: Bounds, [b_low, b_high]: Bounds) -> bool {
+    a_low.cmple(b_high).all() && b_low.cmple(a_high).all()
+}
+
+/// Distance of two boxes; 0 where they meet.
+pub(super) fn gap([a_low, a_high]: Bounds, [b_low, b_high]: Bounds) -> f64 {
+    (a_low - b_high)
+        .max(b_low - a_high)
+        .max(DVec3::ZERO)
+        .length()
+}
+
+/// Length of a box's diagonal.
+pub(super) fn diagonal([low, high]: Bounds) -> f64 {
+    low.distance(high)
+}

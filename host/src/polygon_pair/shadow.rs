@@ -18,7 +18,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use super::Face;
-use super::polygon::{clip, clip_into, edges};
+use super::polygon::{Bounds, bounds, clip, clip_into, edges};
 
 /// A half space `n . v >= offset`, seen from the point.
 type HalfSpace = (DVec3, f64);
@@ -28,8 +28,10 @@ type HalfSpace = (DVec3, f64);
 pub(super) struct Blocker {
     /// Its outline, clipped to the fronts of both polygons.
     pub(super) face: Face,
-    /// The part of the domain whose points it can hide something from.
-    pub(super) footprint: Vec<DVec3>,
+    /// The box around it.
+    pub(super) bounds: Bounds,
+    /// The box around the part of the domain whose points it can hide something from.
+    pub(super) footprint_bounds: Bounds,
     /// Side of the plane that the target is on: 1 front, -1 back, 0 where the plane cuts it.
     target_side: f64,
 }
@@ -53,8 +55,9 @@ impl Blocker {
             (false, false) => return None,
         };
         Some(Self {
+            bounds: bounds(&face.outline),
+            footprint_bounds: bounds(&footprint),
             face,
-            footprint,
             target_side,
         })
     }
