@@ -21,7 +21,7 @@ use std::collections::BinaryHeap;
 use glam::DVec3;
 
 use super::events::{Event, events};
-use super::polygon::{Cell, ROUNDINGS, bilinear, bounds, cells, diagonal, gap, meet};
+use super::polygon::{Bounds, Cell, ROUNDINGS, bilinear, bounds, cells, diagonal, gap, meet};
 use super::rules::{GAUSS, Rule};
 use super::shadow::{Blocker, View};
 use super::{Estimate, Face};
@@ -51,7 +51,7 @@ const CROSSED: f64 = 0.05;
 const BLIND: f64 = 1e-3;
 
 /// The same in units of the third, for cells where curved events of several blockers may hide.
-const SHARED: f64 = 0.0;
+const SHARED: f64 = 0.001;
 
 const COARSE: Rule = GAUSS[1];
 const FINE: Rule = GAUSS[2];
@@ -157,7 +157,7 @@ impl Patch {
         let third = rough[0].1 + rough[1].1;
         let extra = if !events.is_empty() {
             CROSSED * (second + third) + BLIND * (fine[0] + fine[1])
-        } else if mesh.is_shared(&cell) {
+        } else if mesh.is_doubtful(&cell) {
             SHARED * third
         } else {
             0.0
@@ -264,7 +264,7 @@ struct Mesh<'a> {
     normal: DVec3,
     events: Vec<Event>,
     blockers: &'a [Blocker],
-    target_bounds: [DVec3; 2],
+    target_bounds: Bounds,
     grain: f64,
 }
 
@@ -361,7 +361,7 @@ impl<'a> Mesh<'a> {
                 && long > COARSEST * diagonal(blocker.footprint_bounds)
         });
         let is_slender = long > SLENDER * short && {
-            let near = |other: [DVec3; 2]| gap(extent, other) < long;
+            let near = |other: Bounds| gap(extent, other) < long;
             near(self.target_bounds) && self.blockers.iter().any(|b| near(b.bounds))
         };
         if depth > 0 && (is_coarse || is_slender) {
@@ -374,13 +374,15 @@ impl<'a> Mesh<'a> {
         }
     }
 
-    /// True when several blockers may act in a cell.
-    fn is_shared(&self, cell: &Cell) -> bool {
+    /// True where layers along near edges or curved events of several blockers may hide in a cell.
+    fn is_doubtful(&self, cell: &Cell) -> bool {
         let cell = bounds(cell);
         let acting = self
             .blockers
             .iter()
             .filter(|b| meet(cell, b.footprint_bounds));
-        acting.count() > 1
+        let near = |other: Bounds| gap(cell, other) < diagonal(cell);
+        acting.clone().count() > 1
+            || near(self.target_bounds) && acting.clone().any(|b| near(b.bounds))
     }
 }
