@@ -175,12 +175,14 @@ fn solver_factor(
         let vertices = polygon.vertices().iter();
         vertices.map(|v| (*v - origin).as_vec3()).collect()
     };
-    let advice = "the solver takes triangles and quads in f32; use --method exact";
-    let receiver = Polygon::new(&local(from)).context(advice)?;
-    let shooter = Shooter::new(Polygon::new(&local(to)).context(advice)?);
+    let refused = |error: &dyn std::fmt::Display| anyhow!("{error} (in f32); use --method exact");
+    let polygon = |p| Polygon::new(&local(p)).map_err(|error| refused(&error));
+    let (receiver, shooter) = (polygon(from)?, Shooter::new(polygon(to)?));
     let surfaces = blockers.iter().zip(0..);
     let surfaces = surfaces.map(|(b, index)| Surface::new(index, &local(b), Rgb::BLACK));
-    let surfaces: Vec<Surface> = surfaces.collect::<Result<_, _>>().context(advice)?;
+    let surfaces: Vec<Surface> = surfaces
+        .collect::<Result<_, _>>()
+        .map_err(|error| refused(&error))?;
     Ok(Estimate {
         value: f64::from(shooter.form_factor(&receiver, &Occluders(&surfaces))),
         error: f64::NAN,

@@ -131,10 +131,9 @@ impl Contour {
 
     /// `oint ln r dx_2 . t` for a point, and the sum of its terms' absolute values.
     fn integral(&self, x: DVec3, cosines: &[f64]) -> (f64, f64) {
-        let (Some(last), Some(first)) = (self.vertices.last(), self.vertices.first()) else {
+        let Some(first) = self.vertices.first() else {
             return (0.0, 0.0);
         };
-        let _ = last;
         let (mut value, mut magnitude) = (0.0, 0.0);
         let start = *first - x;
         let start_log = log_length(start);

@@ -17,7 +17,7 @@
 use glam::DVec3;
 
 use super::Face;
-use super::polygon::{clip, edges};
+use super::polygon::{clip, edges, meet};
 use super::shadow::Blocker;
 
 /// Sines below this are those of parallel edges.
@@ -25,6 +25,9 @@ const PARALLEL: f64 = 1e-9;
 
 /// Vertices that are lower than the light by less than this share of its height cast no shadow.
 const LEVEL: f64 = 1e-6;
+
+/// Most other blockers that one is paired with, which bounds the work behind hundreds of them.
+const PARTNERS: usize = 12;
 
 /// Where an event shows on the domain.
 #[derive(Clone, Copy, Debug)]
@@ -35,13 +38,15 @@ pub(super) struct Event {
     pub(super) is_strong: bool,
 }
 
-/// All events of single blockers and of pairs of them.
+/// The events of all blockers with the target and with each other.
 pub(super) fn events(domain: &Face, target: &Face, blockers: &[Blocker]) -> Vec<Event> {
     let mut events = Vec::new();
     for (k, blocker) in blockers.iter().enumerate() {
         events.extend(own_plane(domain, &blocker.face));
         pass(domain, &target.outline, &blocker.face.outline, &mut events);
-        for other in &blockers[..k] {
+        let others = blockers[..k].iter();
+        let others = others.filter(|other| meet(other.footprint_bounds, blocker.footprint_bounds));
+        for other in others.take(PARTNERS) {
             pass(
                 domain,
                 &other.face.outline,
@@ -75,49 +80,47 @@ fn own_plane(domain: &Face, blocker: &Face) -> Option<Event> {
 
 /// The events of a lower outline passing before a higher one.
 fn pass(domain: &Face, high: &[DVec3], low: &[DVec3], events: &mut Vec<Event>) {
-    let project = |v: DVec3, w: DVec3| {
+    let in_line = |v: DVec3, w: DVec3| {
         let (height_v, height_w) = (domain.height(v), domain.height(w));
         v + (w - v) * (height_v / (height_v - height_w))
     };
-    let directions = |outline: &[DVec3]| -> Vec<DVec3> {
-        edges(outline)
-            .map(|(a, b)| (b - a).normalize_or_zero())
-            .collect()
+    for (v, partners) in corners(high) {
+        let height = domain.height(v) * (1.0 - LEVEL);
+        let casting = clip(low, 0.0, |w| height - domain.height(w));
+        images(&casting, partners, |w| in_line(v, w), events);
+    }
+    for (w, partners) in corners(low) {
+        let height = domain.height(w) * (1.0 + LEVEL);
+        let shining = clip(high, 0.0, |v| domain.height(v) - height);
+        images(&shining, partners, |v| in_line(v, w), events);
+    }
+}
+
+/// The vertices of an outline with the directions of the edges that meet there.
+fn corners(outline: &[DVec3]) -> impl Iterator<Item = (DVec3, [DVec3; 2])> + '_ {
+    let last = outline.iter().cycle().skip(outline.len().saturating_sub(1));
+    let directions = |(before, (v, next)): (&DVec3, (DVec3, DVec3))| {
+        (v, [v - *before, next - v].map(DVec3::normalize_or_zero))
     };
-    let is_parallel = |a: DVec3, b: DVec3| a.cross(b).length() < PARALLEL;
-    let mut push = |light: DVec3,
-                    image: &mut dyn FnMut(DVec3) -> DVec3,
-                    outline: &[DVec3],
-                    partners: &[DVec3]| {
-        let _ = light;
-        for (a, b) in edges(outline) {
-            let along = (b - a).normalize_or_zero();
-            events.push(Event {
-                from: image(a),
-                to: image(b),
-                is_strong: partners.iter().any(|p| is_parallel(*p, along)),
-            });
+    last.zip(edges(outline)).map(directions)
+}
+
+/// The events that the edges of an outline make with one corner; those parallel to an edge there are strong.
+fn images(
+    outline: &[DVec3],
+    partners: [DVec3; 2],
+    image: impl Fn(DVec3) -> DVec3,
+    events: &mut Vec<Event>,
+) {
+    events.extend(edges(outline).map(|(a, b)| {
+        let along = (b - a).normalize_or_zero();
+        let is_parallel = |partner: &DVec3| partner.cross(along).length() < PARALLEL;
+        Event {
+            from: image(a),
+            to: image(b),
+            is_strong: partners.iter().any(is_parallel),
         }
-    };
-    let (high_directions, low_directions) = (directions(high), directions(low));
-    for (k, v) in high.iter().enumerate() {
-        let height = domain.height(*v);
-        let shown = clip(low, LEVEL * height, |w| {
-            height - domain.height(w) - 2.0 * LEVEL * height
-        });
-        let before = (k + high.len() - 1) % high.len();
-        let partners = [high_directions[k], high_directions[before]];
-        push(*v, &mut |w| project(*v, w), &shown, &partners);
-    }
-    for (k, w) in low.iter().enumerate() {
-        let height = domain.height(*w);
-        let shown = clip(high, LEVEL * height, |v| {
-            domain.height(v) - height - 2.0 * LEVEL * height
-        });
-        let before = (k + low.len() - 1) % low.len();
-        let partners = [low_directions[k], low_directions[before]];
-        push(*w, &mut |v| project(v, *w), &shown, &partners);
-    }
+    }));
 }
 
 impl Event {
@@ -147,5 +150,61 @@ impl Event {
     pub(super) fn split(&self, outline: &[DVec3], normal: DVec3, grain: f64) -> [Vec<DVec3>; 2] {
         let across = normal.cross(self.to - self.from).normalize_or_zero();
         [across, -across].map(|across| clip(outline, grain, |v| across.dot(v - self.from)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn square(z: f64, half: f64) -> Face {
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+        Face {
+            outline: corners
+                .map(|(u, v)| DVec3::new(u * half, v * half, z))
+                .to_vec(),
+            normal: DVec3::Z,
+        }
+    }
+
+    #[test]
+    fn a_plate_midway_makes_strong_events_where_parallel_edges_align() {
+        let (domain, target) = (square(0.0, 1.0), square(1.0, 1.0));
+        let blocker = Blocker::new(square(0.5, 0.25), &domain, &target, 1e-14).unwrap();
+        let events = events(&domain, &target, &[blocker]);
+        // Lines at 2 (+-0.25) - (+-1): +-0.5 inside the domain, +-1.5 outside.
+        let inside: Vec<&Event> = events
+            .iter()
+            .filter(|e| e.crosses(&domain.outline, domain.normal, 1e-9))
+            .collect();
+        assert!(!inside.is_empty());
+        for event in inside {
+            assert!(event.is_strong, "{event:?}");
+            let is_on = |c: fn(DVec3) -> f64| {
+                (c(event.from).abs() - 0.5).abs() < 1e-12
+                    && (c(event.to) - c(event.from)).abs() < 1e-12
+            };
+            assert!(is_on(|v| v.x) || is_on(|v| v.y), "{event:?}");
+        }
+    }
+
+    #[test]
+    fn an_event_parts_an_outline_that_it_crosses() {
+        let domain = square(0.0, 1.0);
+        let event = Event {
+            from: DVec3::new(0.25, -3.0, 0.0),
+            to: DVec3::new(0.25, 0.0, 0.0),
+            is_strong: true,
+        };
+        assert!(event.crosses(&domain.outline, domain.normal, 1e-9));
+        let parts = event.split(&domain.outline, domain.normal, 1e-9);
+        let areas = parts.map(|part| super::super::vector_area(&part).length());
+        assert!((areas[0] + areas[1] - 4.0).abs() < 1e-14, "{areas:?}");
+        let beside = Event {
+            from: event.from + DVec3::X,
+            to: event.to + DVec3::X,
+            ..event
+        };
+        assert!(!beside.crosses(&domain.outline, domain.normal, 1e-9));
     }
 }

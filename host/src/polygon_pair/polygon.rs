@@ -228,3 +228,52 @@ pub(super) fn gap([a_low, a_high]: Bounds, [b_low, b_high]: Bounds) -> f64 {
 pub(super) fn diagonal([low, high]: Bounds) -> f64 {
     low.distance(high)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn square(scale: f64, shift: f64) -> Vec<DVec3> {
+        let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
+        corners
+            .map(|(x, y)| DVec3::new(x, y, 0.0) * scale + shift)
+            .to_vec()
+    }
+
+    #[test]
+    fn polygons_of_any_size_and_place_are_legal() {
+        for (scale, shift) in [(1.0, 0.0), (1e-100, 0.0), (1e100, 0.0), (1e-3, 1e6)] {
+            let polygon = ConvexPolygon::new(&square(scale, shift)).unwrap();
+            assert!(
+                polygon.normal().dot(DVec3::Z) > 0.999_999,
+                "{scale} {shift}"
+            );
+        }
+    }
+
+    #[test]
+    fn repeated_vertices_are_dropped_and_winding_twice_is_refused() {
+        let corners = square(1.0, 0.0);
+        let doubled: Vec<DVec3> = corners.iter().flat_map(|v| [*v, *v]).collect();
+        assert_eq!(ConvexPolygon::new(&doubled).unwrap().vertices(), corners);
+        let twice = [corners.clone(), corners].concat();
+        assert_eq!(ConvexPolygon::new(&twice), Err(PolygonError::Concave));
+        let nan = [DVec3::ZERO, DVec3::X, DVec3::NAN];
+        assert_eq!(ConvexPolygon::new(&nan), Err(PolygonError::NotFinite));
+    }
+
+    #[test]
+    fn clipping_and_cells_keep_the_area() {
+        let angles = (0..7).map(|k| f64::from(k) * std::f64::consts::TAU / 7.0);
+        let outline: Vec<DVec3> = angles.map(|a| DVec3::new(a.cos(), a.sin(), 0.0)).collect();
+        let whole = vector_area(&outline).z;
+        let halves =
+            [1.0, -1.0].map(|side| clip(&outline, 0.0, |v| side * (v.x - 0.3 * v.y - 0.1)));
+        let sum: f64 = halves.iter().map(|half| vector_area(half).z).sum();
+        assert!((sum - whole).abs() < 1e-14, "{sum} {whole}");
+        let sum: f64 = cells(&outline).map(|cell| vector_area(&cell).z).sum();
+        assert!((sum - whole).abs() < 1e-14, "{sum} {whole}");
+        assert!(clip(&outline, 0.0, |v| v.x - 2.0).is_empty());
+        assert!(clip(&outline, 1e-9, |v| v.z).is_empty(), "all on the plane");
+    }
+}

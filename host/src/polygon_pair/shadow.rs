@@ -216,3 +216,74 @@ fn lambert(normal: DVec3, outline: &[DVec3]) -> f64 {
         .sum();
     (sum / TAU).max(0.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A square of half width `half` about the axis, `z` above the origin and facing it.
+    fn plate(x: f64, z: f64, half: f64) -> Face {
+        let corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)];
+        Face {
+            outline: corners
+                .map(|(u, v)| DVec3::new(x + u * half, v * half, z))
+                .to_vec(),
+            normal: -DVec3::Z,
+        }
+    }
+
+    /// Form factor of a point to a square straight above it: four times Howell B-3.
+    fn above(half: f64, z: f64) -> f64 {
+        let x = half / z;
+        4.0 * 2.0 * x / x.hypot(1.0) * (x / x.hypot(1.0)).atan() / TAU
+    }
+
+    fn seen(blockers: Vec<Face>) -> (f64, f64) {
+        let domain = Face {
+            outline: plate(0.0, 0.0, 1.0).outline.into_iter().rev().collect(),
+            normal: DVec3::Z,
+        };
+        let target = plate(0.0, 1.0, 1.0);
+        let blockers = blockers.into_iter();
+        let blockers: Vec<Blocker> = blockers
+            .filter_map(|face| Blocker::new(face, &domain, &target, 1e-14))
+            .collect();
+        View::new(DVec3::Z, &target.outline, &blockers).whole_and_hidden(DVec3::ZERO)
+    }
+
+    #[test]
+    fn a_plate_hides_what_its_shadow_covers_and_overlaps_count_once() {
+        let (whole, hidden) = seen(vec![plate(0.0, 0.5, 0.25)]);
+        assert!((whole - above(1.0, 1.0)).abs() < 1e-15, "{whole}");
+        assert!((hidden - above(0.25, 0.5)).abs() < 1e-15, "{hidden}");
+        // A second plate at another height with the same shadow, and a third inside that.
+        let shadows = vec![
+            plate(0.0, 0.5, 0.25),
+            plate(0.0, 0.25, 0.125),
+            plate(0.0, 0.75, 0.3),
+        ];
+        let (_, hidden) = seen(shadows);
+        assert!((hidden - above(0.25, 0.5)).abs() < 1e-15, "{hidden}");
+    }
+
+    #[test]
+    fn overlapping_shadows_do_not_depend_on_their_order() {
+        let plates = [
+            plate(0.1, 0.5, 0.25),
+            plate(-0.1, 0.3, 0.2),
+            plate(0.3, 0.7, 0.3),
+        ];
+        let (_, there) = seen(plates.to_vec());
+        let (_, back) = seen(plates.into_iter().rev().collect());
+        assert!((there - back).abs() < 1e-15, "{there} {back}");
+    }
+
+    #[test]
+    fn blockers_beside_the_lines_of_sight_are_left_out() {
+        let (domain, target) = (plate(0.0, 0.0, 1.0), plate(0.0, 1.0, 1.0));
+        for beside in [plate(3.0, 0.5, 0.5), plate(2.0, 0.5, 1.0)] {
+            assert!(Blocker::new(beside, &domain, &target, 1e-14).is_none());
+        }
+        assert!(Blocker::new(plate(1.0, 0.5, 0.5), &domain, &target, 1e-14).is_some());
+    }
+}
