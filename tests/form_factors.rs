@@ -304,7 +304,7 @@ fn blockers_that_are_not_between_change_nothing() {
     let beside = parallelogram(DVec3::X, DVec3::Y, DVec3::Z);
     for blocker in [plate(-0.5), plate(0.0), plate(1.0), plate(1.5), beside] {
         assert_eq!(
-            form_factor(&floor, &lid, &[blocker.clone()]),
+            form_factor(&floor, &lid, std::slice::from_ref(&blocker)),
             open,
             "{blocker:?}"
         );

@@ -19,8 +19,8 @@
 //!
 //! The error is the difference of two rules, summed over all parts without regard to signs, a doubt where
 //! rules may agree by chance, and a rounding term; the better of the two rules is returned, so it usually errs a
-//! hundred times less. It is an estimate, no proof: blockers that stand on both plates of a wedge of less than a
-//! degree have been seen to err by several times that much.
+//! hundred times less. It is an estimate, no proof: slanted blockers through the common edge of a slender wedge
+//! have been seen to err by several times that much.
 
 mod polygon;
 

@@ -59,7 +59,8 @@ pub(super) fn integrate(
     });
     let mut sums = Sums::default();
     queue.iter().for_each(|patch| sums.add(patch, 1.0));
-    let by_hidden = sums.hidden.error + open.error < sums.visible.error;
+    let [visible, rest] = sums.routes(open);
+    let by_hidden = rest.error < visible.error;
     queue.iter_mut().for_each(|patch| patch.rank(by_hidden));
 
     let mut queue = BinaryHeap::from(queue);
@@ -99,14 +100,30 @@ impl Sums {
         }
     }
 
-    /// The better of the visible part and of what the hidden part leaves.
+    /// The visible part, and what the hidden part leaves of the open factor.
+    ///
+    /// Both parts together are the open factor, which is known: what the sum misses is an error of the rules
+    /// that the visible part has its share of.
+    fn routes(&self, open: Estimate) -> [Estimate; 2] {
+        let missed = (self.visible.value + self.hidden.value - open.value).abs();
+        let share = (self.visible.value / open.value).clamp(0.0, 1.0);
+        [
+            Estimate {
+                value: self.visible.value,
+                error: self.visible.error + missed * share,
+            },
+            Estimate {
+                value: open.value - self.hidden.value,
+                error: self.hidden.error + open.error,
+            },
+        ]
+    }
+
+    /// The better of the two.
     fn result(&self, open: Estimate) -> Estimate {
-        let rest = Estimate {
-            value: open.value - self.hidden.value,
-            error: self.hidden.error + open.error,
-        };
-        let better = if self.visible.error < rest.error {
-            self.visible
+        let [visible, rest] = self.routes(open);
+        let better = if visible.error < rest.error {
+            visible
         } else {
             rest
         };
