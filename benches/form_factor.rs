@@ -3,20 +3,22 @@
 //! The rows of all patches of the paper's room. A pair is an element and a patch of which neither is
 //! wholly behind the other; the others are found out first and cost little. `open` has no
 //! blockers; the others cut out the shadows of all 20 surfaces, one after the other or those that
-//! the tree finds in the shaft of the pair. `point` is Lambert's formula alone, one point and one quad.
+//! the tree finds in the shaft of the pair. `point` is Lambert's formula alone, one point and one quad. `pair` is the
+//! host's exact factor of two unit squares with its error: far, near, with a common edge, and behind a plate.
 
 mod scenes;
 
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use relume::form_factor::{self, point_to_polygon};
 use relume::geometry::Polygon;
 use relume::mesh::Mesh;
 use relume::visibility::{Occluders, Shaft, Visibility};
 use relume_host::builtin::PaperLamps;
 use relume_host::bvh::Bvh;
+use relume_host::polygon_pair::{self, ConvexPolygon};
 
 /// Nothing hides anything.
 struct Open;
@@ -33,6 +35,7 @@ fn main() {
     let mut criterion = scenes::criterion();
     point(&mut criterion);
     rows(&mut criterion);
+    pairs(&mut criterion);
     criterion.final_summary();
 }
 
@@ -70,6 +73,27 @@ fn rows(criterion: &mut Criterion) {
         bencher.iter(|| all_rows(&mesh, &bvh, &mut row));
     });
     group.finish();
+}
+
+fn pairs(criterion: &mut Criterion) {
+    let square = |origin: DVec3, u: DVec3, v: DVec3| {
+        ConvexPolygon::new(&[origin, origin + u, origin + u + v, origin + v]).expect("a square")
+    };
+    let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+    let floor = square(DVec3::ZERO, x, y);
+    let plate = [square(DVec3::new(0.25, 0.25, 0.5), x / 2.0, y / 2.0)];
+    for (name, to, blockers) in [
+        ("far", square(z * 8.0, y, x), &[][..]),
+        ("near", square(z, y, x), &[]),
+        ("common edge", square(DVec3::ZERO, y, z), &[]),
+        ("behind a plate", square(z, y, x), &plate),
+    ] {
+        criterion.bench_function(&format!("form_factor/pair, {name}"), |bencher| {
+            bencher.iter(|| {
+                polygon_pair::form_factor(black_box(&floor), black_box(&to), black_box(blockers))
+            });
+        });
+    }
 }
 
 fn all_rows(mesh: &Mesh, visibility: &impl Visibility, row: &mut [f32]) {

@@ -381,6 +381,23 @@ fn references_share_no_transport_code_with_what_they_check() {
 }
 
 #[test]
+fn exact_form_factors_share_no_code_with_the_solver_or_the_references() {
+    let sources = sources("host/src");
+    let exact = sources.iter().filter(|s| s.module == "polygon_pair");
+    let exact: Vec<&Source> = exact.collect();
+    assert!(exact.len() >= 2, "one file per method");
+    for source in exact {
+        let path = source.path.display();
+        assert!(!source.says("relume"), "{path} names the solver");
+        let host = source.own_crate();
+        assert!(
+            host.is_subset(&BTreeSet::from(["polygon_pair"])),
+            "{path} takes from the host: {host:?}"
+        );
+    }
+}
+
+#[test]
 fn the_top_level_holds_what_a_visitor_has_to_understand() {
     let entries = fs::read_dir(root()).unwrap();
     let all = entries.map(|e| e.unwrap().file_name().to_string_lossy().into_owned());

@@ -40,6 +40,8 @@ pub mod export;
 
 pub mod preview;
 
+pub mod polygon_pair;
+
 pub mod reference;
 
 pub mod cli;

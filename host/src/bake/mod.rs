@@ -4,6 +4,7 @@
 //! elements gather all bounces by rays ([`Method::Gather`]), or patches shoot them along further rows
 //! through the solver's own refinement ([`relume::refine`]), as a device does.
 
+mod accuracy;
 mod bounce;
 mod direct;
 mod estimate;
@@ -45,6 +46,9 @@ pub struct Settings {
     pub shots: Option<u32>,
     /// As published: patches shoot, none is divided, no row is kept and no ambient term is added.
     pub plain: bool,
+    /// Estimated relative L1 error of the worst light to meet, by the length of the elements and the
+    /// number of rays; `None` for elements and rays as the other settings have them.
+    pub error: Option<f32>,
     /// Relative L1 error, of the worst light, that the rays may leave.
     pub noise: f32,
     /// Relative variation of direct light inside a patch above which it is divided to shoot.
@@ -63,6 +67,7 @@ impl Default for Settings {
             residual: 1e-4,
             shots: None,
             plain: false,
+            error: None,
             noise: 0.005,
             variation: 0.15,
             split_direct: false,
@@ -152,6 +157,17 @@ impl From<BuildError> for BakeError {
 /// # Errors
 /// [`BakeError`] when the scene is not fit to be baked.
 pub fn bake(
+    scene: &OwnedScene,
+    settings: &Settings,
+    watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+) -> Result<Solution, BakeError> {
+    match settings.error {
+        None => bake_once(scene, settings, watch),
+        Some(goal) => accuracy::bake_to(scene, settings, goal, watch),
+    }
+}
+
+fn bake_once(
     scene: &OwnedScene,
     settings: &Settings,
     watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
@@ -324,6 +340,7 @@ mod tests {
         residual: 1e-4,
         shots: None,
         plain: false,
+        error: None,
         noise: 1e-9,
         variation: 0.15,
         split_direct: false,

@@ -39,6 +39,9 @@ pub struct Arguments {
     /// Stop when every light has at most this share of its power left to distribute
     #[arg(long, value_name = "R", default_value_t = Settings::default().residual, value_parser = positive)]
     residual: f32,
+    /// Meet this estimated relative error for every light, with elements and rays that are just enough
+    #[arg(long, value_name = "E", value_parser = positive, conflicts_with_all = ["shots", "plain"])]
+    error: Option<f32>,
     /// Stop after so many distinct rows and passes of 16 rays (plain shots with --plain)
     #[arg(long, value_name = "N")]
     shots: Option<u32>,
@@ -79,6 +82,7 @@ impl Arguments {
             residual: self.residual,
             shots: self.shots,
             plain: self.plain,
+            error: self.error,
             split_direct: self.split_direct,
             method: match self.method {
                 MethodName::Gather => Method::Gather,
@@ -130,6 +134,9 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     let bytes = solution::write(&baked.solution);
     write_file(&output, &bytes)?;
     report(&baked, &output.display().to_string(), bytes.len());
+    if let Some(goal) = arguments.error {
+        report_choice(&baked, goal);
+    }
 
     let solution = &baked.solution;
     let lights = solution.lights.iter().map(|light| {
@@ -272,5 +279,28 @@ fn report(baked: &Baked, file: &str, bytes: usize) {
         100.0 * baked.error(),
         baked.time.as_secs_f64(),
         human_bytes(bytes),
+    );
+}
+
+/// What `--error` chose, and why.
+fn report_choice(baked: &Baked, goal: f32) {
+    let solution = &baked.solution;
+    let worst = solution
+        .lights
+        .iter()
+        .max_by(|a, b| a.error.total_cmp(&b.error));
+    let name = worst.map_or("", |light| &light.name);
+    let verdict = if baked.error() <= goal {
+        "met"
+    } else {
+        "NOT met: ask for shorter elements (--element)"
+    };
+    tell!(
+        "error {:.2} % wanted, {:.2} % estimated for the worst light ({name}): {verdict}; elements of \
+         {:.3} for the variation inside them, {} rows and passes of 16 rays for the scatter",
+        100.0 * goal,
+        100.0 * baked.error(),
+        solution.spacing.element,
+        solution.rows,
     );
 }

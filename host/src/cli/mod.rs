@@ -4,6 +4,7 @@
 //! limit is hit (one line), 2 wrong usage, 130 interrupted with a valid result.
 
 mod bake;
+mod form_factor;
 mod info;
 mod job;
 mod load;
@@ -44,6 +45,8 @@ enum Command {
     Relight(relight::Arguments),
     /// Irradiance at points or elements, for every light by itself
     Probe(probe::Arguments),
+    /// Form factors between pairs of polygons, with or without blockers
+    FormFactor(form_factor::Arguments),
     /// What a solution or atlas holds, and what it costs on a device
     Info(info::Arguments),
 }
@@ -73,6 +76,7 @@ pub fn run() -> ExitCode {
         Some(Command::Pack(arguments)) => pack::run(&arguments, cli.json),
         Some(Command::Relight(arguments)) => relight::run(&arguments, cli.json),
         Some(Command::Probe(arguments)) => probe::run(&arguments, cli.json),
+        Some(Command::FormFactor(arguments)) => form_factor::run(&arguments, cli.json),
         Some(Command::Info(arguments)) => info::run(&arguments),
     };
     let written = outcome.and_then(|outcome| {
