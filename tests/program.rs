@@ -44,7 +44,7 @@ fn read_solution(folder: &Folder, name: &str) -> Solution {
 }
 
 /// One row of a probe.
-#[derive(Debug)]
+#[derive(Debug, PartialEq)]
 struct Row {
     place: usize,
     light: String,
@@ -600,6 +600,40 @@ fn threads_and_method_do_not_change_a_byte() {
         }
     }
     assert!(bake("", "device") == bake("", "rows"));
+}
+
+#[test]
+fn a_light_that_changes_is_solved_again_as_in_a_whole_bake() {
+    let folder = with_scene();
+    folder.write("bulb.toml", BULB);
+    let moved = BULB.replace("[1.25, 2.0", "[2.25, 1.5");
+    assert_ne!(moved, BULB, "where the bulb hangs");
+    folder.write("moved.toml", moved);
+    let bake = format!("bake room.obj {MESH}");
+    let old = folder.json(&format!(
+        "{bake} --lights bulb.toml --keep-rows r.rows -o old"
+    ));
+    let whole = folder.json(&format!("{bake} --lights moved.toml -o whole"));
+    assert_eq!(old["elements"], whole["elements"]);
+    assert_eq!(old["shots"], whole["shots"], "as many rays");
+    let update = "bake room.obj --lights moved.toml --update old --rows r.rows";
+    let (_, said) = folder.told(&format!("{update} -o new"));
+    assert!(said.contains("lights solved again: 1"), "{said}");
+    let [old, new, whole] = ["old", "new", "whole"].map(|file| elements(&folder, file, ""));
+    assert!(new == whole && new != old);
+
+    // Rows of another mesh, other walls, damaged rows.
+    folder.done("bake room.obj --element 0.5 --keep-rows other.rows -o other");
+    for (wrong, what) in [
+        ("bake room.obj --update old --rows other.rows", "other.rows"),
+        ("bake room.obj --update old --rows room.obj", "room.obj"),
+        ("bake boxes.obj --update old --rows r.rows", "boxes.obj"),
+    ] {
+        folder.write("boxes.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+        let line = folder.refused(&format!("{wrong} -o no"));
+        assert!(line.contains(what), "{line}");
+    }
+    folder.misused("bake room.obj --update old -o no");
 }
 
 #[test]

@@ -8,6 +8,7 @@ use std::cell::Cell;
 use std::ops::ControlFlow;
 
 use super::{BakeError, Progress, Settings, bake_once, estimate};
+use crate::gather::Hits;
 use crate::mesh;
 use crate::scene::OwnedScene;
 use crate::solution::Solution;
@@ -34,7 +35,7 @@ pub(super) fn bake_to(
     settings: &Settings,
     goal: f32,
     watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
-) -> Result<Solution, BakeError> {
+) -> Result<(Solution, Hits), BakeError> {
     let centred = mesh::centred(scene);
     let start = mesh::spacing(&centred.view()?, settings.patch, settings.element);
     let mut settings = Settings {
@@ -53,7 +54,7 @@ pub(super) fn bake_to(
     let mut bakes = 0;
     loop {
         settings.element = Some(element);
-        let solution = bake_once(scene, &settings, &mut watch)?;
+        let (solution, hits) = bake_once(scene, &settings, &mut watch)?;
         bakes += 1;
         let lights = solution.lights.len();
         let of_mesh = estimate::mesh_errors(&solution.mesh, &solution.contributions, lights);
@@ -69,7 +70,7 @@ pub(super) fn bake_to(
             || is_met && is_as_coarse_as_can_be
             || !is_met && (is_too_fine || wanted >= element)
         {
-            return Ok(solution);
+            return Ok((solution, hits));
         }
         element = wanted;
     }

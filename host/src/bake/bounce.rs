@@ -21,7 +21,11 @@ const HIT_BYTES: usize = 2 << 30;
 const FIRST_LOOK: u32 = 8;
 
 /// Direct light, then passes of rays until their noise is small enough or the job ends.
-pub(super) fn gather(job: &mut Job, mesh: OwnedMesh, bvh: &Bvh) -> Result<Solved, BakeError> {
+pub(super) fn gather(
+    job: &mut Job,
+    mesh: OwnedMesh,
+    bvh: &Bvh,
+) -> Result<(Solved, Hits), BakeError> {
     let view = mesh.view();
     let pass_bytes = mesh.elements.len() * RAYS_PER_PASS as usize * 4;
     let passes = MOST_PASSES
@@ -31,10 +35,18 @@ pub(super) fn gather(job: &mut Job, mesh: OwnedMesh, bvh: &Bvh) -> Result<Solved
 
     let mut light = Light::new(&mesh, job.lights());
     let filler = Parallel::new(&view, bvh);
-    let lamps = direct::visit(job, &mesh, &filler, Lamps::Whole, most, |row| {
-        light.add(&row);
-        Ok(())
-    })?;
+    let lamps = direct::visit(
+        job,
+        &mesh,
+        &filler,
+        Lamps::Whole,
+        most,
+        |_| true,
+        |row| {
+            light.add(&row);
+            Ok(())
+        },
+    )?;
     light.bounce(&mesh, &Hits::default(), job.settings.residual);
     let rays = Rays::new(view, bvh, luminaire::far(job.scene));
     let mut hits = Hits::default();
@@ -55,7 +67,32 @@ pub(super) fn gather(job: &mut Job, mesh: OwnedMesh, bvh: &Bvh) -> Result<Solved
     }
     light.bounce(&mesh, &hits, job.settings.residual);
     light.estimate(&mesh, &hits);
-    Ok(light.solved(lamps.rows + hits.passes() as u32, mesh, job.settings))
+    let rows = lamps.rows + hits.passes() as u32;
+    Ok((light.solved(rows, mesh, job.settings), hits))
+}
+
+/// Direct light of some lights, and its bounces along rays that were cast before.
+pub(super) fn along(
+    job: &mut Job,
+    mesh: OwnedMesh,
+    bvh: &Bvh,
+    hits: &Hits,
+    is_wanted: impl Fn(u32) -> bool,
+) -> Result<Solved, BakeError> {
+    let passes = hits.passes() as u32;
+    let most = direct::shooters(&mesh, Lamps::Whole).len() as u32 + passes;
+    let mut light = Light::new(&mesh, job.lights());
+    let filler = Parallel::new(&mesh.view(), bvh);
+    let lamps = direct::visit(job, &mesh, &filler, Lamps::Whole, most, is_wanted, |row| {
+        light.add(&row);
+        Ok(())
+    })?;
+    if !lamps.is_complete {
+        return Err(BakeError::Interrupted);
+    }
+    light.bounce(&mesh, hits, job.settings.residual);
+    light.estimate(&mesh, hits);
+    Ok(light.solved(lamps.rows + passes, mesh, job.settings))
 }
 
 /// Light on the elements.

@@ -53,7 +53,8 @@ pub(super) struct Visited {
     pub is_complete: bool,
 }
 
-/// Visits the direct light of every luminaire, then of every lamp, until the job ends. `most` is
+/// Visits the direct light of every luminaire, then of every lamp, that is wanted by its light, until
+/// the job ends. `most` is
 /// how many rows there may be in all.
 pub(super) fn visit(
     job: &mut Job,
@@ -61,6 +62,7 @@ pub(super) fn visit(
     filler: &impl RowFiller,
     lamps: Lamps,
     most: u32,
+    is_wanted: impl Fn(u32) -> bool,
     mut visit: impl FnMut(DirectRow) -> Result<(), BakeError>,
 ) -> Result<Visited, BakeError> {
     let view = mesh.view();
@@ -72,6 +74,9 @@ pub(super) fn visit(
         if (job.watch)(Progress::Meshing { done, parts }).is_break() {
             return Err(BakeError::Interrupted);
         }
+        if !is_wanted(luminaire.light()) {
+            continue;
+        }
         filler.luminaire(&view, luminaire, far, &mut row);
         let arrived = row.iter().zip(&mesh.elements);
         visit(DirectRow {
@@ -82,7 +87,8 @@ pub(super) fn visit(
             row: &row,
         })?;
     }
-    let shooters = shooters(mesh, lamps);
+    let mut shooters = shooters(mesh, lamps);
+    shooters.retain(|(_, _, emission)| is_wanted(emission.light));
     let mut rows = 0;
     for (source, polygon, emission) in &shooters {
         if job.ends(rows, most, 1.0) {

@@ -9,6 +9,7 @@ mod bounce;
 mod direct;
 mod estimate;
 mod shoot;
+mod update;
 
 use std::ops::ControlFlow;
 
@@ -20,12 +21,14 @@ use relume::visibility::Occluders;
 use thiserror::Error;
 
 use crate::bvh::Bvh;
+use crate::gather::Hits;
 use crate::mesh::{self, BuildError, OwnedMesh};
 use crate::rows::{Parallel, Serial};
 use crate::scene::OwnedScene;
 use crate::solution::{Solution, SolutionLight};
 
 pub use crate::solution::Method;
+pub use update::update;
 
 /// Lanes of a block of lights on the host.
 const LANES: usize = 8;
@@ -117,6 +120,12 @@ pub enum BakeError {
          the scene, and hang other lights in front of surfaces, not on them"
     )]
     NothingLit,
+    /// An update was asked for that only a whole bake can give.
+    #[error(
+        "more than its lights has changed since that solution was baked, or it was not baked by \
+         --method gather; bake it again"
+    )]
+    OtherScene,
     /// The watcher broke before there was anything to return.
     #[error("interrupted before the first row")]
     Interrupted,
@@ -161,6 +170,18 @@ pub fn bake(
     settings: &Settings,
     watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<Solution, BakeError> {
+    Ok(bake_keeping(scene, settings, watch)?.0)
+}
+
+/// [`bake`], with what an [`update`] needs: where the rays ended, nothing where there are none.
+///
+/// # Errors
+/// As [`bake`].
+pub fn bake_keeping(
+    scene: &OwnedScene,
+    settings: &Settings,
+    watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+) -> Result<(Solution, Hits), BakeError> {
     match settings.error {
         None => bake_once(scene, settings, watch),
         Some(goal) => accuracy::bake_to(scene, settings, goal, watch),
@@ -171,7 +192,7 @@ fn bake_once(
     scene: &OwnedScene,
     settings: &Settings,
     watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
-) -> Result<Solution, BakeError> {
+) -> Result<(Solution, Hits), BakeError> {
     if scene.lights.is_empty() {
         return Err(BakeError::NoLight);
     }
@@ -198,12 +219,14 @@ fn bake_once(
     };
     let parallel = |mesh: &Mesh| Parallel::new(mesh, &bvh);
     let serial = |_: &Mesh| Serial(Occluders(view.surfaces()));
-    let solved = match settings.method {
+    let (solved, hits) = match settings.method {
         Method::Gather if !settings.plain => bounce::gather(&mut job, mesh, &bvh)?,
-        Method::Gather | Method::Rows => shoot::refine(&mut job, mesh, parallel)?,
-        Method::Device => shoot::refine(&mut job, mesh, serial)?,
+        Method::Gather | Method::Rows => {
+            (shoot::refine(&mut job, mesh, parallel)?, Hits::default())
+        }
+        Method::Device => (shoot::refine(&mut job, mesh, serial)?, Hits::default()),
     };
-    Ok(solution(scene, settings.method, spacing, solved))
+    Ok((solution(scene, settings.method, spacing, solved), hits))
 }
 
 /// What there is to do, and who watches.
@@ -266,7 +289,7 @@ fn solution(scene: &OwnedScene, method: Method, spacing: Spacing, solved: Solved
     Solution {
         surfaces: scene.surfaces.iter().map(|s| *s.polygon()).collect(),
         luminaires: scene.luminaires.clone(),
-        mesh: mesh::returned(&solved.mesh, scene),
+        mesh: mesh::placed(&solved.mesh, &scene.surfaces),
         lights: lights
             .map(|((light, residual), error)| SolutionLight {
                 name: light.name.clone(),

@@ -46,16 +46,24 @@ pub(super) fn refine<F: RowFiller>(
     let mut irradiance = vec![0.0; mesh.elements.len() * lights];
     let most = (mesh.patches.len() * SHOOTERS_PER_PATCH) as u32;
     let direct_filler = filler(&mesh.view());
-    let visited = direct::visit(job, &mesh, &direct_filler, lamps, most, |direct| {
-        add_direct(&mut irradiance, lights, &direct);
-        held.push(Held {
-            light: direct.light,
-            share: direct.share,
-            source: direct.source,
-            row: direct.row.to_vec(),
-        });
-        Ok(())
-    })?;
+    let visited = direct::visit(
+        job,
+        &mesh,
+        &direct_filler,
+        lamps,
+        most,
+        |_| true,
+        |direct| {
+            add_direct(&mut irradiance, lights, &direct);
+            held.push(Held {
+                light: direct.light,
+                share: direct.share,
+                source: direct.source,
+                row: direct.row.to_vec(),
+            });
+            Ok(())
+        },
+    )?;
     let mut first: Vec<u32> = (0..mesh.patches.len() as u32).collect();
     if visited.is_complete {
         let irradiance = irradiance.as_slice();

@@ -1,20 +1,20 @@
 //! `relume bake`.
 
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use relume::color::Rgb;
 use serde_json::json;
 
-use super::{Outcome, human_bytes, output_path, tell, write_file};
-use crate::bake::{BakeError, Method, Progress, Settings, bake};
+use super::{Outcome, human_bytes, keep, output_path, tell, write_file};
+use crate::bake::{BakeError, Method, Progress, Settings, bake_keeping, update};
+use crate::gather::{self, Hits};
 use crate::import;
-use crate::scene::OwnedScene;
 use crate::solution::{self, Solution};
 
 /// Most names in a line for people; `--json` has them all.
@@ -55,6 +55,15 @@ pub struct Arguments {
     /// solver does that alone, as on a device
     #[arg(long, value_enum, default_value_t = MethodName::Gather)]
     method: MethodName,
+    /// Keep where the rays ended, for --update
+    #[arg(long, value_name = "FILE.rows", conflicts_with = "update")]
+    keep_rows: Option<PathBuf>,
+    /// Solve again only for the lights that are not as in this solution
+    #[arg(long, value_name = "OLD.solution", requires = "rows", conflicts_with_all = ["patch", "element", "shots", "plain", "error", "split_direct"])]
+    update: Option<PathBuf>,
+    /// What --keep-rows kept when that solution was baked
+    #[arg(long, value_name = "FILE.rows", requires = "update")]
+    rows: Option<PathBuf>,
     /// Threads [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
@@ -102,6 +111,10 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
         "solution",
         json,
     );
+    let inputs = [&arguments.lights, &arguments.update, &arguments.rows];
+    for input in inputs.into_iter().flatten() {
+        keep(input, &output);
+    }
     let imported = import::load(&arguments.scene, arguments.lights.as_deref())?;
     for line in imported.repairs.lines() {
         tell!("{path}: {line}");
@@ -112,9 +125,26 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
         pool = pool.num_threads(threads.into());
     }
     let pool = pool.build().context("starting threads")?;
-    let baked = pool
-        .install(|| watched(&imported.scene, &arguments.settings()))
-        .with_context(|| path.clone())?;
+    let scene = &imported.scene;
+    let settings = arguments.settings();
+    let baked = match (&arguments.update, &arguments.rows) {
+        (Some(old), Some(rows)) => {
+            let (old, hits) = read_old(old, rows)?;
+            let settings = Settings {
+                split_direct: old.direct.is_some(),
+                ..settings
+            };
+            pool.install(|| {
+                watched(|watch| {
+                    let (solution, changed) = update(scene, &old, &hits, &settings, watch)?;
+                    tell!("{path}: lights solved again: {changed}");
+                    Ok((solution, hits.clone()))
+                })
+            })
+        }
+        _ => pool.install(|| watched(|watch| bake_keeping(scene, &settings, watch))),
+    };
+    let baked = baked.with_context(|| path.clone())?;
     let Some(baked) = baked else {
         return Ok(Outcome {
             interrupted: true,
@@ -130,6 +160,14 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
         };
         let names = unlit[..unlit.len().min(MOST_NAMES)].join(", ");
         tell!("{path}: lights that reach no surface: {names}{more}");
+    }
+    if let Some(file) = &arguments.keep_rows {
+        if baked.solution.method != Method::Gather {
+            bail!("{}: only --method gather has rays to keep", file.display());
+        }
+        let mesh = solution::mesh_checksum(&baked.solution);
+        let elements = baked.solution.mesh.elements.len();
+        write_file(file, &gather::write(&baked.hits, mesh, elements))?;
     }
     let bytes = solution::write(&baked.solution);
     write_file(&output, &bytes)?;
@@ -167,9 +205,21 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     })
 }
 
+/// The solution to be updated, and the rows that belong to it.
+fn read_old(old: &Path, rows: &Path) -> Result<(Solution, Hits)> {
+    let bytes = super::load::read(old)?;
+    let solution = solution::read(&bytes).with_context(|| old.display().to_string())?;
+    let mesh = solution::mesh_checksum(&solution);
+    let bytes = super::load::read(rows)?;
+    let hits = gather::read(&bytes, mesh, solution.mesh.elements.len())
+        .with_context(|| rows.display().to_string())?;
+    Ok((solution, hits))
+}
+
 /// A solution, how long it took, and whether the user ended it.
 pub struct Baked {
     pub solution: Solution,
+    hits: Hits,
     pub time: Duration,
     pub interrupted: bool,
 }
@@ -214,7 +264,11 @@ pub fn is_interrupted() -> bool {
 
 /// Bakes with a progress bar (on a terminal) and an ear for Ctrl-C; `None` when that came before
 /// there was a solution.
-pub fn watched(scene: &OwnedScene, settings: &Settings) -> Result<Option<Baked>> {
+pub fn watched(
+    bake: impl FnOnce(
+        &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<(Solution, Hits), BakeError>,
+) -> Result<Option<Baked>> {
     // A handler that is already there does the same.
     let _ = ctrlc::set_handler(|| {
         if INTERRUPTED.swap(true, Ordering::Relaxed) {
@@ -250,14 +304,16 @@ pub fn watched(scene: &OwnedScene, settings: &Settings) -> Result<Option<Baked>>
             ControlFlow::Continue(())
         }
     };
-    let solution = bake(scene, settings, &mut watch);
+    let baked = bake(&mut watch);
     bar.finish_and_clear();
-    if matches!(solution, Err(BakeError::Interrupted)) {
+    if matches!(baked, Err(BakeError::Interrupted)) {
         tell!("interrupted before the first row: there is nothing to write");
         return Ok(None);
     }
+    let (solution, hits) = baked?;
     Ok(Some(Baked {
-        solution: solution?,
+        solution,
+        hits,
         time: start.elapsed(),
         interrupted,
     }))

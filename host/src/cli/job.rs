@@ -16,7 +16,7 @@ use tiny_skia::Pixmap;
 use super::bake::{Baked, is_interrupted, watched};
 use super::relight::BACKGROUND;
 use super::{Outcome, human_bytes, tell, write_file};
-use crate::bake::Settings;
+use crate::bake::{Settings, bake_keeping};
 use crate::builtin::{Builtin, cornell_box};
 use crate::display_error::max_codes;
 use crate::export::exr;
@@ -157,7 +157,7 @@ fn make(folder: &mut Folder) -> Result<serde_json::Value> {
         element: Some(spacing.element),
         ..Settings::default()
     };
-    let baked = watched(&scene, &settings)?.ok_or(Interrupted)?;
+    let baked = watched(|watch| bake_keeping(&scene, &settings, watch))?.ok_or(Interrupted)?;
     let solution = &baked.solution;
     let format = Format {
         code: Code::Exp8s,

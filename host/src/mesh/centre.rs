@@ -45,12 +45,13 @@ pub fn centred(scene: &OwnedScene) -> Centred<'_> {
     })
 }
 
-/// The mesh of a scene that was [`centred`], where the scene lies. Areas stay those of the centre.
+/// A mesh where the surfaces lie that it was made of, or that it was moved from. Areas stay what
+/// they were.
 #[must_use]
-pub fn returned(mesh: &OwnedMesh, scene: &OwnedScene) -> OwnedMesh {
+pub fn placed(mesh: &OwnedMesh, surfaces: &[Surface]) -> OwnedMesh {
     let mut mesh = mesh.clone();
     for face in &mut mesh.faces {
-        if let Some(surface) = scene.surfaces.get(face.surface as usize) {
+        if let Some(surface) = surfaces.get(face.surface as usize) {
             face.polygon = match face.side {
                 Side::Front => *surface.polygon(),
                 Side::Back => surface.polygon().flipped(),

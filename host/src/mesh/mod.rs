@@ -17,7 +17,7 @@ use thiserror::Error;
 use crate::bvh::Bvh;
 use crate::scene::OwnedScene;
 
-pub use centre::{Centred, centred, returned};
+pub use centre::{Centred, centred, placed};
 pub use locate::Locator;
 pub use split::{Direct, Split, split};
 

@@ -99,12 +99,7 @@ pub fn write(solution: &Solution) -> Vec<u8> {
     }
     output.u32(solution.rows);
     output.f32s(&[solution.spacing.patch, solution.spacing.element]);
-    for polygon in &solution.surfaces {
-        output.u32(polygon.vertices().len() as u32);
-        for vertex in polygon.vertices() {
-            output.f32s(&vertex.to_array());
-        }
-    }
+    write_surfaces(&solution.surfaces, &mut output);
     write_mesh(mesh, &mut output);
     for light in &solution.lights {
         output.u32(light.name.len() as u32);
@@ -124,6 +119,26 @@ pub fn write(solution: &Solution) -> Vec<u8> {
     }
     output.u32(CRC.checksum(&output.0));
     output.0
+}
+
+/// Checksum of the surfaces and the mesh, whatever emits, to tell what belongs to them.
+#[must_use]
+pub fn mesh_checksum(solution: &Solution) -> u32 {
+    let mut mesh = solution.mesh.clone();
+    mesh.faces.iter_mut().for_each(|face| face.emission = None);
+    let mut output = Output(Vec::new());
+    write_surfaces(&solution.surfaces, &mut output);
+    write_mesh(&mesh, &mut output);
+    CRC.checksum(&output.0)
+}
+
+fn write_surfaces(surfaces: &[Polygon], output: &mut Output) {
+    for polygon in surfaces {
+        output.u32(polygon.vertices().len() as u32);
+        for vertex in polygon.vertices() {
+            output.f32s(&vertex.to_array());
+        }
+    }
 }
 
 fn write_mesh(mesh: &OwnedMesh, output: &mut Output) {

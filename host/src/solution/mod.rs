@@ -8,7 +8,7 @@ use relume::geometry::Polygon;
 use relume::mesh::Spacing;
 use relume::scene::Luminaire;
 
-pub use file::{FileError, MAGIC, read, write};
+pub use file::{FileError, MAGIC, mesh_checksum, read, write};
 
 use crate::mesh::OwnedMesh;
 

@@ -10,6 +10,8 @@
 //! work grows with the elements alone. The places on the receiver and the directions are a rank-one
 //! sequence in four dimensions (Roberts 2018, R4), shifted for every receiver by its number.
 
+mod file;
+
 use std::f32::consts::TAU;
 
 use glam::{Vec2, Vec3};
@@ -22,6 +24,8 @@ use relume::refine::krylov::{self, Work};
 use crate::bvh::Bvh;
 use crate::mesh::Locator;
 use crate::noise;
+
+pub use file::{RowsError, read, write};
 
 /// A ray that ends in no element.
 const NOTHING: u32 = u32::MAX;
@@ -126,7 +130,7 @@ fn cosine_direction(normal: Vec3, u: f32, v: f32) -> Vec3 {
 }
 
 /// Where the rays of every element end.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Hits {
     /// One list for each pass, element by element.
     passes: Vec<Vec<u32>>,
