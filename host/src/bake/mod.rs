@@ -18,8 +18,8 @@ use relume::visibility::Occluders;
 use thiserror::Error;
 
 use crate::bvh::Bvh;
-use crate::mesh::{self, BuildError, OwnedMesh};
-use crate::rows::{Parallel, Serial};
+use crate::mesh::{self, BuildError, Centred, OwnedMesh};
+use crate::rows::{Parallel, RowFiller, Serial};
 use crate::scene::OwnedScene;
 use crate::solution::{Solution, SolutionLight};
 
@@ -66,6 +66,8 @@ pub struct Settings {
     pub shots: Option<u32>,
     /// As published: patches shoot, none is divided, no row is kept and no ambient term is added.
     pub plain: bool,
+    /// Plain shots: add the ambient term all the same.
+    pub ambient: bool,
     /// Relative L1 error, of the worst light, that the rays may leave.
     pub noise: f32,
     /// Relative variation of direct light inside a patch above which it is divided to shoot.
@@ -84,6 +86,7 @@ impl Default for Settings {
             residual: 1e-4,
             shots: None,
             plain: false,
+            ambient: false,
             noise: 0.005,
             variation: 0.15,
             split_direct: false,
@@ -177,38 +180,126 @@ pub fn bake(
     settings: &Settings,
     watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<Solution, BakeError> {
-    if scene.lights.is_empty() {
-        return Err(BakeError::NoLight);
-    }
-    let centred = mesh::centred(scene);
-    let view = centred.view()?;
-    if view.surfaces().iter().all(|s| s.reflectance().is_black()) {
-        return Err(BakeError::NothingReflects);
-    }
-    let spacing = mesh::spacing(&view, settings.patch, settings.element);
-    let bvh = Bvh::for_scene(&view);
-    let mesh = mesh::build(scene, &view, spacing, &bvh, &mut |done, parts| {
-        watch(Progress::Meshing { done, parts })
-    })?;
-    if mesh.elements.is_empty() {
-        return Err(BakeError::NothingLit);
-    }
-    check_memory(&mesh, scene.lights.len(), settings)?;
+    Meshed::new(scene, settings.patch, settings.element, watch)?.solve(settings, watch)
+}
 
-    let mut job = Job {
-        scene: &view,
-        importances: scene.lights.iter().map(|light| light.importance).collect(),
-        settings,
-        watch,
-    };
-    let parallel = |mesh: &Mesh| Parallel::new(mesh, &bvh);
-    let serial = |_: &Mesh| Serial(Occluders(view.surfaces()));
-    let solved = match settings.method {
-        Method::Gather if !settings.plain => bounce::gather(&mut job, mesh, &bvh)?,
-        Method::Gather | Method::Rows => shoot::refine(&mut job, mesh, parallel)?,
-        Method::Device => shoot::refine(&mut job, mesh, serial)?,
-    };
-    Ok(solution(scene, spacing, solved))
+/// A scene that is divided and ready to be lit.
+#[derive(Debug)]
+pub struct Meshed<'a> {
+    scene: &'a OwnedScene,
+    centred: Centred<'a>,
+    spacing: Spacing,
+    bvh: Bvh,
+    mesh: OwnedMesh,
+}
+
+impl<'a> Meshed<'a> {
+    /// Divides a scene, into patches and elements of these lengths or by the rule of [`mesh::spacing`].
+    ///
+    /// # Errors
+    /// [`BakeError`] when the scene is not fit to be baked, or the watcher breaks.
+    pub fn new(
+        scene: &'a OwnedScene,
+        patch: Option<f32>,
+        element: Option<f32>,
+        watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<Self, BakeError> {
+        if scene.lights.is_empty() {
+            return Err(BakeError::NoLight);
+        }
+        let centred = mesh::centred(scene);
+        let view = centred.view()?;
+        if view.surfaces().iter().all(|s| s.reflectance().is_black()) {
+            return Err(BakeError::NothingReflects);
+        }
+        let spacing = mesh::spacing(&view, patch, element);
+        let bvh = Bvh::for_scene(&view);
+        let mesh = mesh::build(scene, &view, spacing, &bvh, &mut |done, parts| {
+            watch(Progress::Meshing { done, parts })
+        })?;
+        if mesh.elements.is_empty() {
+            return Err(BakeError::NothingLit);
+        }
+        Ok(Self {
+            scene,
+            spacing,
+            bvh,
+            mesh,
+            centred,
+        })
+    }
+
+    /// The mesh, where it is solved: near the origin.
+    #[must_use]
+    pub const fn mesh(&self) -> &OwnedMesh {
+        &self.mesh
+    }
+
+    /// The tree of what blocks, in the same place.
+    #[must_use]
+    pub const fn bvh(&self) -> &Bvh {
+        &self.bvh
+    }
+
+    /// The scene in the same place, as the solver sees it.
+    ///
+    /// # Errors
+    /// [`SceneError`] when a tag is out of range.
+    pub fn view(&self) -> Result<Scene<'_>, SceneError> {
+        self.centred.view()
+    }
+
+    /// Solves as the settings say; `watch` as for [`bake`].
+    ///
+    /// # Errors
+    /// [`BakeError`] when there is not enough memory, or the watcher breaks early.
+    pub fn solve(
+        &self,
+        settings: &Settings,
+        watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<Solution, BakeError> {
+        let view = self.view()?;
+        let parallel = |mesh: &Mesh| Parallel::new(mesh, &self.bvh);
+        let serial = |_: &Mesh| Serial(Occluders(view.surfaces()));
+        self.run(settings, watch, |job, mesh| match settings.method {
+            Method::Gather if !settings.plain => bounce::gather(job, mesh, &self.bvh),
+            Method::Gather | Method::Rows => shoot::refine(job, mesh, parallel),
+            Method::Device => shoot::refine(job, mesh, serial),
+        })
+    }
+
+    /// Solves by shooting rows that `filler` fills for the mesh it is given, whatever the method.
+    ///
+    /// # Errors
+    /// [`BakeError`] when there is not enough memory, the watcher breaks early, or a row is illegal.
+    pub fn solve_with<F: RowFiller>(
+        &self,
+        settings: &Settings,
+        filler: impl Fn(&Mesh) -> F,
+        watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<Solution, BakeError> {
+        self.run(settings, watch, |job, mesh| {
+            shoot::refine(job, mesh, filler)
+        })
+    }
+
+    fn run(
+        &self,
+        settings: &Settings,
+        watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+        solve: impl FnOnce(&mut Job, OwnedMesh) -> Result<Solved, BakeError>,
+    ) -> Result<Solution, BakeError> {
+        let lights = &self.scene.lights;
+        check_memory(&self.mesh, lights.len(), settings)?;
+        let mut job = Job {
+            scene: &self.view()?,
+            importances: lights.iter().map(|light| light.importance).collect(),
+            settings,
+            watch,
+        };
+        let solved = solve(&mut job, self.mesh.clone())?;
+        Ok(solution(self.scene, self.spacing, solved))
+    }
 }
 
 /// What there is to do, and who watches.
@@ -333,6 +424,7 @@ mod tests {
         residual: 1e-4,
         shots: None,
         plain: false,
+        ambient: false,
         noise: 1e-9,
         variation: 0.15,
         split_direct: false,

@@ -178,7 +178,7 @@ fn read_out(
     };
     let ambient: Vec<Rgb> = (0..lights)
         .map(|light| {
-            if settings.plain || is_lost(light) {
+            if (settings.plain && !settings.ambient) || is_lost(light) {
                 Rgb::BLACK
             } else {
                 refinement.ambient(light)
