@@ -42,4 +42,6 @@ pub mod preview;
 
 pub mod reference;
 
+pub mod chart;
+
 pub mod cli;
