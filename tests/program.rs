@@ -1290,3 +1290,14 @@ fn a_light_that_nobody_sees_bakes() {
     let line = folder.refused(bake(0.0));
     assert!(line.contains("light reaches no surface"), "{line}");
 }
+
+#[test]
+fn a_study_needs_its_name_and_a_folder() {
+    let folder = Folder::new();
+    folder.misused("study");
+    folder.misused("study accuracy");
+    folder.misused("study nothing -o there");
+    folder.write("file", "");
+    let line = folder.refused("study accuracy -o file");
+    assert!(line.contains("file: cannot be made"), "{line}");
+}

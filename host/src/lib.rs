@@ -44,4 +44,6 @@ pub mod reference;
 
 pub mod chart;
 
+pub mod study;
+
 pub mod cli;
