@@ -629,7 +629,10 @@ fn a_light_that_changes_is_solved_again_as_in_a_whole_bake() {
         ("bake room.obj --update old --rows room.obj", "room.obj"),
         ("bake boxes.obj --update old --rows r.rows", "boxes.obj"),
     ] {
-        folder.write("boxes.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+        folder.write(
+            "boxes.obj",
+            "mtllib room.mtl\nusemtl white\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+        );
         let line = folder.refused(&format!("{wrong} -o no"));
         assert!(line.contains(what), "{line}");
     }
@@ -1323,4 +1326,15 @@ fn a_light_that_nobody_sees_bakes() {
     // A box that is black inside keeps all light.
     let line = folder.refused(bake(0.0));
     assert!(line.contains("light reaches no surface"), "{line}");
+}
+
+#[test]
+fn a_study_needs_its_name_and_a_folder() {
+    let folder = Folder::new();
+    folder.misused("study");
+    folder.misused("study accuracy");
+    folder.misused("study nothing -o there");
+    folder.write("file", "");
+    let line = folder.refused("study accuracy -o file");
+    assert!(line.contains("file: cannot be made"), "{line}");
 }

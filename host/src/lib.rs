@@ -44,4 +44,8 @@ pub mod polygon_pair;
 
 pub mod reference;
 
+pub mod chart;
+
+pub mod study;
+
 pub mod cli;

@@ -37,6 +37,14 @@ pub trait RowFiller {
     /// Form factors from every element to a polygon: a patch, or a whole lamp.
     fn shooter(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]);
 
+    /// Form factors from every element to a patch; zeros for one that the mesh does not have.
+    fn patch(&self, mesh: &Mesh, patch: u32, row: &mut [f32]) {
+        match mesh.patch_polygon(patch) {
+            Some(polygon) => self.shooter(mesh, &polygon, row),
+            None => row.fill(0.0),
+        }
+    }
+
     /// The same for a whole lamp, which may be large and seen through much.
     fn lamp(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
         self.shooter(mesh, polygon, row);

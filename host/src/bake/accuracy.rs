@@ -7,7 +7,7 @@
 use std::cell::Cell;
 use std::ops::ControlFlow;
 
-use super::{BakeError, Progress, Settings, bake_once, estimate};
+use super::{BakeError, Meshed, Progress, Settings, estimate};
 use crate::gather::Hits;
 use crate::mesh;
 use crate::scene::OwnedScene;
@@ -54,7 +54,8 @@ pub(super) fn bake_to(
     let mut bakes = 0;
     loop {
         settings.element = Some(element);
-        let (solution, hits) = bake_once(scene, &settings, &mut watch)?;
+        let (solution, hits) = Meshed::new(scene, settings.patch, settings.element, &mut watch)?
+            .solve(&settings, &mut watch)?;
         bakes += 1;
         let lights = solution.lights.len();
         let of_mesh = estimate::mesh_errors(&solution.mesh, &solution.contributions, lights);

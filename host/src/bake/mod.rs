@@ -22,8 +22,8 @@ use thiserror::Error;
 
 use crate::bvh::Bvh;
 use crate::gather::Hits;
-use crate::mesh::{self, BuildError, OwnedMesh};
-use crate::rows::{Parallel, Serial};
+use crate::mesh::{self, BuildError, Centred, OwnedMesh};
+use crate::rows::{Parallel, RowFiller, Serial};
 use crate::scene::OwnedScene;
 use crate::solution::{Solution, SolutionLight};
 
@@ -52,6 +52,8 @@ pub struct Settings {
     /// Estimated relative L1 error of the worst light to meet, by the length of the elements and the
     /// number of rays; `None` for elements and rays as the other settings have them.
     pub error: Option<f32>,
+    /// Plain shots: add the ambient term all the same.
+    pub ambient: bool,
     /// Relative L1 error, of the worst light, that the rays may leave.
     pub noise: f32,
     /// Relative variation of direct light inside a patch above which it is divided to shoot.
@@ -71,6 +73,7 @@ impl Default for Settings {
             shots: None,
             plain: false,
             error: None,
+            ambient: false,
             noise: 0.005,
             variation: 0.15,
             split_direct: false,
@@ -183,50 +186,133 @@ pub fn bake_keeping(
     watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<(Solution, Hits), BakeError> {
     match settings.error {
-        None => bake_once(scene, settings, watch),
+        None => Meshed::new(scene, settings.patch, settings.element, watch)?.solve(settings, watch),
         Some(goal) => accuracy::bake_to(scene, settings, goal, watch),
     }
 }
 
-fn bake_once(
-    scene: &OwnedScene,
-    settings: &Settings,
-    watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
-) -> Result<(Solution, Hits), BakeError> {
-    if scene.lights.is_empty() {
-        return Err(BakeError::NoLight);
-    }
-    let centred = mesh::centred(scene);
-    let view = centred.view()?;
-    if view.surfaces().iter().all(|s| s.reflectance().is_black()) {
-        return Err(BakeError::NothingReflects);
-    }
-    let spacing = mesh::spacing(&view, settings.patch, settings.element);
-    let bvh = Bvh::for_scene(&view);
-    let mesh = mesh::build(scene, &view, spacing, &bvh, &mut |done, parts| {
-        watch(Progress::Meshing { done, parts })
-    })?;
-    if mesh.elements.is_empty() {
-        return Err(BakeError::NothingLit);
-    }
-    check_memory(&mesh, scene.lights.len(), settings)?;
+/// A scene that is divided and ready to be lit.
+#[derive(Debug)]
+pub struct Meshed<'a> {
+    scene: &'a OwnedScene,
+    centred: Centred<'a>,
+    spacing: Spacing,
+    bvh: Bvh,
+    mesh: OwnedMesh,
+}
 
-    let mut job = Job {
-        scene: &view,
-        importances: scene.lights.iter().map(|light| light.importance).collect(),
-        settings,
-        watch,
-    };
-    let parallel = |mesh: &Mesh| Parallel::new(mesh, &bvh);
-    let serial = |_: &Mesh| Serial(Occluders(view.surfaces()));
-    let (solved, hits) = match settings.method {
-        Method::Gather if !settings.plain => bounce::gather(&mut job, mesh, &bvh)?,
-        Method::Gather | Method::Rows => {
-            (shoot::refine(&mut job, mesh, parallel)?, Hits::default())
+impl<'a> Meshed<'a> {
+    /// Divides a scene, into patches and elements of these lengths or by the rule of [`mesh::spacing`].
+    ///
+    /// # Errors
+    /// [`BakeError`] when the scene is not fit to be baked, or the watcher breaks.
+    pub fn new(
+        scene: &'a OwnedScene,
+        patch: Option<f32>,
+        element: Option<f32>,
+        watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<Self, BakeError> {
+        if scene.lights.is_empty() {
+            return Err(BakeError::NoLight);
         }
-        Method::Device => (shoot::refine(&mut job, mesh, serial)?, Hits::default()),
-    };
-    Ok((solution(scene, settings.method, spacing, solved), hits))
+        let centred = mesh::centred(scene);
+        let view = centred.view()?;
+        if view.surfaces().iter().all(|s| s.reflectance().is_black()) {
+            return Err(BakeError::NothingReflects);
+        }
+        let spacing = mesh::spacing(&view, patch, element);
+        let bvh = Bvh::for_scene(&view);
+        let mesh = mesh::build(scene, &view, spacing, &bvh, &mut |done, parts| {
+            watch(Progress::Meshing { done, parts })
+        })?;
+        if mesh.elements.is_empty() {
+            return Err(BakeError::NothingLit);
+        }
+        Ok(Self {
+            scene,
+            spacing,
+            bvh,
+            mesh,
+            centred,
+        })
+    }
+
+    /// The mesh, where it is solved: near the origin.
+    #[must_use]
+    pub const fn mesh(&self) -> &OwnedMesh {
+        &self.mesh
+    }
+
+    /// The tree of what blocks, in the same place.
+    #[must_use]
+    pub const fn bvh(&self) -> &Bvh {
+        &self.bvh
+    }
+
+    /// The scene in the same place, as the solver sees it.
+    ///
+    /// # Errors
+    /// [`SceneError`] when a tag is out of range.
+    pub fn view(&self) -> Result<Scene<'_>, SceneError> {
+        self.centred.view()
+    }
+
+    /// Solves as the settings say, and tells where the rays ended; `watch` as for [`bake`].
+    ///
+    /// # Errors
+    /// [`BakeError`] when there is not enough memory, or the watcher breaks early.
+    pub fn solve(
+        &self,
+        settings: &Settings,
+        watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<(Solution, Hits), BakeError> {
+        let view = self.view()?;
+        let parallel = |mesh: &Mesh| Parallel::new(mesh, &self.bvh);
+        let serial = |_: &Mesh| Serial(Occluders(view.surfaces()));
+        self.run(settings, watch, |job, mesh| match settings.method {
+            Method::Gather if !settings.plain => bounce::gather(job, mesh, &self.bvh),
+            Method::Gather | Method::Rows => without_hits(shoot::refine(job, mesh, parallel)),
+            Method::Device => without_hits(shoot::refine(job, mesh, serial)),
+        })
+    }
+
+    /// Solves by shooting rows that `filler` fills for the mesh it is given, whatever the method.
+    ///
+    /// # Errors
+    /// [`BakeError`] when there is not enough memory, the watcher breaks early, or a row is illegal.
+    pub fn solve_with<F: RowFiller>(
+        &self,
+        settings: &Settings,
+        filler: impl Fn(&Mesh) -> F,
+        watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<Solution, BakeError> {
+        let rows = |job: &mut Job, mesh| without_hits(shoot::refine(job, mesh, filler));
+        Ok(self.run(settings, watch, rows)?.0)
+    }
+
+    fn run(
+        &self,
+        settings: &Settings,
+        watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+        solve: impl FnOnce(&mut Job, OwnedMesh) -> Result<(Solved, Hits), BakeError>,
+    ) -> Result<(Solution, Hits), BakeError> {
+        let lights = &self.scene.lights;
+        check_memory(&self.mesh, lights.len(), settings)?;
+        let mut job = Job {
+            scene: &self.view()?,
+            importances: lights.iter().map(|light| light.importance).collect(),
+            settings,
+            watch,
+        };
+        let (solved, hits) = solve(&mut job, self.mesh.clone())?;
+        let solution = solution(self.scene, settings.method, self.spacing, solved);
+        Ok((solution, hits))
+    }
+}
+
+/// Rows leave no rays behind.
+fn without_hits(solved: Result<Solved, BakeError>) -> Result<(Solved, Hits), BakeError> {
+    Ok((solved?, Hits::default()))
 }
 
 /// What there is to do, and who watches.
@@ -364,6 +450,7 @@ mod tests {
         shots: None,
         plain: false,
         error: None,
+        ambient: false,
         noise: 1e-9,
         variation: 0.15,
         split_direct: false,

@@ -103,9 +103,7 @@ pub(super) fn refine<F: RowFiller>(
         if job.ends(refinement.rows_evaluated(), most, refinement.residual()) {
             break;
         }
-        if let Some(polygon) = mesh.view().patch_polygon(patch) {
-            filler.shooter(&mesh.view(), &polygon, &mut row);
-        }
+        filler.patch(&mesh.view(), patch, &mut row);
         refinement.shoot(patch, &row)?;
     }
     refinement.finish();
@@ -193,7 +191,7 @@ fn read_out(
     };
     let ambient: Vec<Rgb> = (0..lights)
         .map(|light| {
-            if settings.plain || is_lost(light) {
+            if (settings.plain && !settings.ambient) || is_lost(light) {
                 Rgb::BLACK
             } else {
                 refinement.ambient(light)

@@ -11,6 +11,7 @@ mod load;
 mod pack;
 mod probe;
 mod relight;
+mod study;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -49,6 +50,8 @@ enum Command {
     FormFactor(form_factor::Arguments),
     /// What a solution or atlas holds, and what it costs on a device
     Info(info::Arguments),
+    /// Published methods beside ours, measured
+    Study(study::Arguments),
 }
 
 /// How a command ended, with what `--json` prints.
@@ -78,6 +81,7 @@ pub fn run() -> ExitCode {
         Some(Command::Probe(arguments)) => probe::run(&arguments, cli.json),
         Some(Command::FormFactor(arguments)) => form_factor::run(&arguments, cli.json),
         Some(Command::Info(arguments)) => info::run(&arguments),
+        Some(Command::Study(arguments)) => study::run(&arguments),
     };
     let written = outcome.and_then(|outcome| {
         if cli.json {

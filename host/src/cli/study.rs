@@ -1,0 +1,36 @@
+//! `relume study`.
+
+mod accuracy;
+
+use std::fs;
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use clap::{Args, ValueEnum};
+
+use super::Outcome;
+
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Which study
+    #[arg(value_enum)]
+    name: Name,
+    /// Folder for tables and charts; made if it is not there
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Name {
+    /// Error against time and work of published methods and ours, as charts
+    Accuracy,
+}
+
+pub fn run(arguments: &Arguments) -> Result<Outcome> {
+    let folder = &arguments.output;
+    fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
+    let report = match arguments.name {
+        Name::Accuracy => accuracy::run(folder)?,
+    };
+    Ok(Outcome::done(report))
+}
