@@ -50,7 +50,7 @@ pub fn write(hits: &Hits, mesh: u32, elements: usize) -> Vec<u8> {
 /// Rows from bytes, for the mesh with this checksum and so many elements.
 ///
 /// # Errors
-/// [`RowsError`] for anything that [`write`] does not write for it.
+/// [`RowsError`] for anything that [`write()`] does not write for it.
 pub fn read(bytes: &[u8], mesh: u32, elements: usize) -> Result<Hits, RowsError> {
     let rest = bytes.strip_prefix(&MAGIC).ok_or(RowsError::NotRows)?;
     let (words, []) = rest.as_chunks::<4>() else {
