@@ -42,4 +42,6 @@ pub mod preview;
 
 pub mod reference;
 
+pub mod study;
+
 pub mod cli;

@@ -10,6 +10,7 @@ mod load;
 mod pack;
 mod probe;
 mod relight;
+mod study;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -46,6 +47,8 @@ enum Command {
     Probe(probe::Arguments),
     /// What a solution or atlas holds, and what it costs on a device
     Info(info::Arguments),
+    /// Published methods beside ours, measured
+    Study(study::Arguments),
 }
 
 /// How a command ended, with what `--json` prints.
@@ -74,6 +77,7 @@ pub fn run() -> ExitCode {
         Some(Command::Relight(arguments)) => relight::run(&arguments, cli.json),
         Some(Command::Probe(arguments)) => probe::run(&arguments, cli.json),
         Some(Command::Info(arguments)) => info::run(&arguments),
+        Some(Command::Study(arguments)) => study::run(&arguments),
     };
     let written = outcome.and_then(|outcome| {
         if cli.json {

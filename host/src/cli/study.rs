@@ -1,0 +1,41 @@
+//! `relume study`.
+
+mod paper;
+mod stability;
+mod table;
+
+use std::fs;
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use clap::{Args, ValueEnum};
+
+use super::Outcome;
+
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Which study
+    #[arg(value_enum)]
+    name: Name,
+    /// Folder for tables and charts; made if it is not there
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Name {
+    /// Known failures: a published method beside ours, and the bound we keep
+    Stability,
+    /// The tables of the papers beside ours
+    Paper,
+}
+
+pub fn run(arguments: &Arguments) -> Result<Outcome> {
+    let folder = &arguments.output;
+    fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
+    let report = match arguments.name {
+        Name::Stability => stability::run(folder)?,
+        Name::Paper => paper::run(folder)?,
+    };
+    Ok(Outcome::done(report))
+}
