@@ -94,8 +94,8 @@ fn rows_needed(room: &Room) -> Result<u32> {
     Ok(rows)
 }
 
-/// The bake's loop on undivided patches.
-fn solve<const K: usize>(room: &Room, rows: u32) -> Result<()> {
+/// The bake's loop on undivided patches and exact rows, of which so many are filled at most.
+pub(super) fn solve<const K: usize>(room: &Room, rows: u32) -> Result<()> {
     let mesh = room.mesh.view();
     let filler = Parallel::new(&mesh, &room.bvh);
     let mut memory = Memory::<K>::new(&mesh, room.lights(), mesh.patches.len());

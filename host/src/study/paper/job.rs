@@ -9,16 +9,16 @@ use anyhow::Result;
 use glam::Vec2;
 use relume::form_factor::Shooter;
 use relume::mesh::{Element, Mesh};
-use relume::refine::Refinement;
 use relume::scene::Luminaire;
 
+use super::cached::solve;
 use super::clock::{median, published, tried};
 use super::rooms::{Room, SPACING, only, room};
 use super::sampling::SHOTS;
 use crate::bvh::Bvh;
 use crate::rows::{Parallel, RowFiller};
 use crate::study::hemicube::Hemicube;
-use crate::study::system::{Field, Memory, System, Way};
+use crate::study::system::{Field, LANES, System, Way};
 
 /// Parts of an element along each direction.
 const PARTS: u32 = 4;
@@ -68,7 +68,7 @@ pub fn measure(repeats: usize) -> Result<SeedJob> {
     let alone: Vec<Room> = alone.collect::<Result<_>>()?;
     let (mut of_ours, mut of_hemicubes, mut of_row) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..repeats {
-        of_ours.push(tried(|| solve(&room))?);
+        of_ours.push(tried(|| solve::<LANES>(&room, u32::MAX))?);
         let mut rows = Vec::new();
         of_hemicubes.push(tried(|| -> Result<()> {
             for room in &alone {
@@ -135,21 +135,6 @@ fn hemicube(room: &Room) -> Hemicube<'_> {
         bvh: &room.bvh,
         resolution: RESOLUTION,
     }
-}
-
-/// Every exact row, then the solve.
-fn solve(room: &Room) -> Result<()> {
-    let mesh = room.mesh.view();
-    let filler = Parallel::new(&mesh, &room.bvh);
-    let mut memory = Memory::<8>::new(&mesh, room.lights(), mesh.patches.len());
-    let mut refinement = Refinement::new(mesh, room.lights(), 1e-6, memory.storage())?;
-    let mut row = vec![0.0; mesh.elements.len()];
-    while let Some(patch) = refinement.next_shooter() {
-        filler.patch(&mesh, patch, &mut row);
-        refinement.shoot(patch, &row)?;
-    }
-    refinement.finish();
-    Ok(())
 }
 
 /// Exact factors, averaged over parts of the elements.

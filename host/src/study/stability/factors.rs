@@ -8,7 +8,9 @@ use relume::geometry::Polygon;
 use relume::visibility::Occluders;
 
 use super::Case;
-use super::naive::{EpsilonRays, Kernel, UNOCCLUDED, normalised, point_to_patch, point_to_point};
+use super::naive::{
+    EpsilonRays, Kernel, RAY_EPSILON, UNOCCLUDED, normalised, point_to_patch, point_to_point,
+};
 use super::scenes::{Stage, ceiling_square, furnace_box, furnace_error, grey_room, sum_error};
 use crate::builtin::Builder;
 use crate::reference::closed_form::{self, parallel_rectangles, perpendicular_rectangles};
@@ -41,7 +43,7 @@ fn touching_elements() -> Result<Case> {
     Ok(Case {
         name: "point-to-point kernel on touching elements".into(),
         quantity: "largest |receiver sum - 1|, closed cube",
-        method: "cos a cos b A / (pi r^2) between centres (Goral et al. 1984, eq. 3)",
+        method: "cos a cos b A / (pi r^2) between centres (West 2007)",
         naive: sum_error(&naive),
         ours: sum_error(&stage.exact()?),
         bound: 1e-5,
@@ -90,7 +92,7 @@ fn slivers() -> Result<Case> {
     Ok(Case {
         name: "slivers, 1 : 10^4".into(),
         quantity: "largest relative error of irradiance, slab of 1 m x 1 m x 0.1 mm as a furnace",
-        method: "cos a cos b A / (pi r^2) between centres, at most 1 (Goral et al. 1984, eq. 3)",
+        method: "cos a cos b A / (pi r^2) between centres, at most 1 (West 2007)",
         naive: error(&naive)?,
         ours: error(&stage.exact()?)?,
         bound: 1e-3,
@@ -112,7 +114,7 @@ fn coplanar_overlap() -> Result<Case> {
     let stage = Stage::new(scene, 0.5, 0.25);
     let rays = EpsilonRays {
         surfaces: &stage.scene.surfaces,
-        epsilon: 0.0,
+        epsilon: RAY_EPSILON,
     };
     let naive = stage.system(|_| Kernel {
         kernel: point_to_patch,
@@ -122,7 +124,7 @@ fn coplanar_overlap() -> Result<Case> {
     Ok(Case {
         name: "coplanar overlap".into(),
         quantity: "largest |receiver sum - 1|, closed cube with a sheet in the plane of its floor",
-        method: "rays between surfaces without an offset (Wallace et al. 1989 as printed)",
+        method: "rays that start 1e-3 off every surface (pbrt's RAY_EPSILON, Pharr and Humphreys 2004)",
         naive: sum_error(&naive),
         ours: sum_error(&ours),
         bound: 1e-5,
@@ -152,7 +154,7 @@ fn lamp_on_a_wall() -> Result<Case> {
     Ok(Case {
         name: "a light that touches a wall".into(),
         quantity: "relative error of the form factor from the element that it touches (closed form)",
-        method: "cos a cos b A / (pi r^2) between centres (Goral et al. 1984, eq. 3)",
+        method: "cos a cos b A / (pi r^2) between centres (West 2007)",
         naive: error(point_to_point(&wall, &lamp)),
         ours: error(ours),
         bound: 0.01,

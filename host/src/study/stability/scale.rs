@@ -8,15 +8,12 @@ use relume::mesh::Spacing;
 use relume::scene::Surface;
 
 use super::Case;
-use super::naive::{EpsilonRays, Kernel, point_to_patch};
+use super::naive::{EpsilonRays, Kernel, RAY_EPSILON, point_to_patch};
 use super::scenes::Stage;
 use crate::bake::{Settings, bake};
 use crate::builtin::{Builtin, PaperLamps, paper_room};
 use crate::scene::OwnedScene;
 use crate::study::system::{Field, System, Way};
-
-/// How far rays start from surfaces, whatever the scene's unit is (`RAY_EPSILON` of pbrt, first edition).
-const EPSILON: f32 = 1e-3;
 
 pub fn cases() -> Result<Vec<Case>> {
     let room = paper_room(PaperLamps::Eight)?;
@@ -88,7 +85,7 @@ fn placed(scene: &OwnedScene, scale: f32, offset: f32) -> Result<OwnedScene> {
 fn with_epsilon(scene: &OwnedScene, spacing: Spacing) -> Result<(System, Field)> {
     let rays = EpsilonRays {
         surfaces: &scene.surfaces,
-        epsilon: EPSILON,
+        epsilon: RAY_EPSILON,
     };
     let stage = Stage::new(scene.clone(), spacing.patch, spacing.element);
     let system = stage.system(|_| Kernel {
