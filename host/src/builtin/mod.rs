@@ -49,13 +49,13 @@ pub enum BuiltinError {
 
 /// A scene that is being put together.
 #[derive(Default)]
-struct Builder {
-    scene: OwnedScene,
+pub(crate) struct Builder {
+    pub(crate) scene: OwnedScene,
 }
 
 impl Builder {
     /// Adds a light of its own name and nominal emission; returns its tag.
-    fn light(&mut self, name: impl Into<String>, emission: Rgb) -> u32 {
+    pub(crate) fn light(&mut self, name: impl Into<String>, emission: Rgb) -> u32 {
         self.scene.lights.push(Light {
             name: name.into(),
             emission,
@@ -78,17 +78,25 @@ impl Builder {
     }
 
     /// Adds a surface that reflects from its front.
-    fn surface(&mut self, vertices: &[Vec3], reflectance: Rgb) -> Result<(), BuiltinError> {
+    pub(crate) fn surface(
+        &mut self,
+        vertices: &[Vec3],
+        reflectance: Rgb,
+    ) -> Result<(), BuiltinError> {
         self.add(vertices, reflectance, |_, surface| Ok(surface))
     }
 
     /// Adds a surface that reflects from both sides.
-    fn two_sided(&mut self, vertices: &[Vec3], reflectance: Rgb) -> Result<(), BuiltinError> {
+    pub(crate) fn two_sided(
+        &mut self,
+        vertices: &[Vec3],
+        reflectance: Rgb,
+    ) -> Result<(), BuiltinError> {
         self.add(vertices, reflectance, |_, surface| Ok(surface.two_sided()))
     }
 
     /// Adds a surface that emits all of a light and reflects from its front.
-    fn lamp(
+    pub(crate) fn lamp(
         &mut self,
         vertices: &[Vec3],
         reflectance: Rgb,
@@ -109,7 +117,7 @@ impl Builder {
 
 /// The faces of the cuboid between two corners, fronts outwards: floor, ceiling, then the sides of
 /// low x, high x, low z, high z.
-fn cuboid(low: Vec3, high: Vec3) -> [[Vec3; 4]; 6] {
+pub(crate) fn cuboid(low: Vec3, high: Vec3) -> [[Vec3; 4]; 6] {
     let corner = |x: u8, y: u8, z: u8| {
         let pick = |bit, low, high| if bit == 0 { low } else { high };
         Vec3::new(
@@ -159,7 +167,7 @@ fn cuboid(low: Vec3, high: Vec3) -> [[Vec3; 4]; 6] {
 }
 
 /// The same outline seen from behind.
-fn reversed([a, b, c, d]: [Vec3; 4]) -> [Vec3; 4] {
+pub(crate) fn reversed([a, b, c, d]: [Vec3; 4]) -> [Vec3; 4] {
     [a, d, c, b]
 }
 

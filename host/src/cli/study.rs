@@ -1,6 +1,9 @@
 //! `relume study`.
 
 mod accuracy;
+mod paper;
+mod stability;
+mod table;
 
 use std::fs;
 use std::path::PathBuf;
@@ -24,6 +27,10 @@ pub struct Arguments {
 enum Name {
     /// Error against time and work of published methods and ours, as charts
     Accuracy,
+    /// Known failures: a published method beside ours, and the bound we keep
+    Stability,
+    /// The tables of the papers beside ours
+    Paper,
 }
 
 pub fn run(arguments: &Arguments) -> Result<Outcome> {
@@ -31,6 +38,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome> {
     fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
     let report = match arguments.name {
         Name::Accuracy => accuracy::run(folder)?,
+        Name::Stability => stability::run(folder)?,
+        Name::Paper => paper::run(folder)?,
     };
     Ok(Outcome::done(report))
 }

@@ -1,11 +1,15 @@
-//! Studies: what the methods cost and how exact they are, measured in one run.
+//! Studies: published methods beside ours, what they cost and how exact they are, measured in one run.
 //!
 //! A naive method is a published one, by name, and goes through the same code as ours; where that has no
 //! use for it, it lives here.
 
 pub mod accuracy;
 pub mod hemicube;
+pub mod paper;
 pub mod ray_rows;
+pub mod shooting;
+pub mod stability;
+pub mod system;
 pub mod truth;
 
 /// A built-in scene, divided for a test.

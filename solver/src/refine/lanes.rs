@@ -22,13 +22,17 @@ pub(super) fn part<const K: usize>(
     tail.get_mut(..length).unwrap_or_default()
 }
 
-/// `E_j += F_j delta` for every element of a block.
+/// `E_j += F_j delta` for every element of a block that sees the shooter.
 pub(super) fn distribute<const K: usize>(
     irradiance: &mut [Lanes<K>],
     row: &[f32],
     delta: &Lanes<K>,
 ) {
     for (lanes, factor) in irradiance.iter_mut().zip(row) {
+        // A third of a room faces away: its lanes need not be fetched.
+        if *factor == 0.0 {
+            continue;
+        }
         for (channel, shot) in lanes.iter_mut().zip(delta) {
             for (value, shot) in channel.iter_mut().zip(shot) {
                 *value += factor * shot;
@@ -59,17 +63,17 @@ pub(super) fn add_scaled<const K: usize>(lanes: &mut Lanes<K>, delta: &Lanes<K>,
     }
 }
 
-/// Sum over lanes of a weight times a function of the channels' sum.
-pub(super) fn weighted<const K: usize>(
+/// `sums_m += weight_m f(P_m)` with the sum `P_m` over the channels.
+pub(super) fn add_weighted<const K: usize>(
+    sums: &mut [f32; K],
     [r, g, b]: &Lanes<K>,
     weights: &[f32; K],
     function: impl Fn(f32) -> f32,
-) -> f32 {
+) {
     let channels = r.iter().zip(g).zip(b);
-    channels
-        .zip(weights)
-        .map(|(((r, g), b), weight)| weight * function(r + g + b))
-        .sum()
+    for ((sum, ((r, g), b)), weight) in sums.iter_mut().zip(channels).zip(weights) {
+        *sum += weight * function(r + g + b);
+    }
 }
 
 pub(super) fn sum(value: Rgb) -> f32 {

@@ -34,7 +34,7 @@ pub use error::RefineError;
 pub use lanes::Lanes;
 pub use storage::{Block, FixedStorage, PatchState, RowStorage, Storage};
 
-use lanes::{add_scaled, add_to_lane, address, distribute, part, sum, weighted};
+use lanes::{add_scaled, add_to_lane, add_weighted, address, distribute, part, sum};
 
 /// Which patch is next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -190,9 +190,11 @@ impl<'a, const K: usize> Refinement<'a, K> {
     pub fn next_shooter(&mut self) -> Option<u32> {
         let is_known = |state: &PatchState| state.row != 0;
         let is_unknown = |state: &PatchState| state.row == 0;
-        let nearly_done = self.residual_of(is_unknown) <= self.residual;
-        if self.merit(is_known) > self.merit(is_unknown) || nearly_done {
-            self.settle();
+        if self.rows_kept > 0 {
+            let nearly_done = self.residual_of(is_unknown) <= self.residual;
+            if nearly_done || self.merit(is_known) > self.merit(is_unknown) {
+                self.settle();
+            }
         }
         // What known patches hold is solved for in the end.
         if self.residual_of(is_unknown) <= self.residual {
@@ -291,7 +293,10 @@ impl<'a, const K: usize> Refinement<'a, K> {
         let count = self.mesh.patches.len();
         let unshot = part(self.storage.unshot, block, count);
         for (lanes, state) in unshot.iter_mut().zip(self.storage.patches.iter()) {
-            add_scaled(lanes, delta, state.gathered);
+            // Lamps and what the row does not reach reflect nothing.
+            if state.gathered != Rgb::BLACK {
+                add_scaled(lanes, delta, state.gathered);
+            }
         }
         if source == Source::Outside {
             let sources = part(self.storage.rows.sources, block, count);
@@ -328,19 +333,24 @@ impl<'a, const K: usize> Refinement<'a, K> {
     /// How much a patch has to shoot, by the rule of the choice.
     fn patch_merit(&self, patch: u32, area: f32) -> f32 {
         let count = self.mesh.patches.len();
-        let blocks = self.storage.blocks.iter().zip(0..);
-        blocks
-            .filter_map(|(block, index)| {
-                let lanes = self.storage.unshot.get(index * count + patch as usize)?;
-                Some(match self.choice {
-                    Choice::Power => weighted(lanes, &block.importance, |power| power * area),
-                    Choice::Relative => {
-                        let shares = block.importance_by_power();
-                        weighted(lanes, &shares, |power| power * area * power * area)
-                    }
-                })
-            })
-            .sum()
+        // Lane by lane over all blocks, so that no addition waits for the one before it.
+        let mut merits = [0.0; K];
+        for (block, index) in self.storage.blocks.iter().zip(0..) {
+            let Some(lanes) = self.storage.unshot.get(index * count + patch as usize) else {
+                continue;
+            };
+            match self.choice {
+                Choice::Power => {
+                    add_weighted(&mut merits, lanes, &block.importance, |power| power * area);
+                }
+                Choice::Relative => {
+                    let shares = block.importance_by_power();
+                    let square = |power: f32| power * area * power * area;
+                    add_weighted(&mut merits, lanes, &shares, square);
+                }
+            }
+        }
+        merits.iter().sum()
     }
 
     /// The sum of merits of all patches that `admit` lets pass.
