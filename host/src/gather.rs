@@ -12,27 +12,22 @@
 
 use std::f32::consts::TAU;
 
-use glam::{Vec2, Vec3};
+use glam::Vec2;
 use rayon::prelude::*;
 use relume::geometry::{Polygon, from_unit_square};
 use relume::mesh::{Mesh, Side};
 use relume::refine::Lanes;
 use relume::refine::krylov::{self, Work};
 
-use crate::bvh::Bvh;
+use crate::bvh::{Bvh, lifted};
 use crate::mesh::Locator;
 use crate::noise;
 
 /// A ray that ends in no element.
 const NOTHING: u32 = u32::MAX;
 
-/// `1/g, 1/g^2, 1/g^3, 1/g^4` with `g^5 = g + 1`.
-const STEPS: [f64; 4] = [
-    0.856_674_883_854_502_9,
-    0.733_891_856_627_126,
-    0.628_706_721_037_808_6,
-    0.538_597_257_223_61,
-];
+/// `1/g, 1/g^2, 1/g^3, 1/g^4` with `g^5 = g + 1`, in parts of 2^32.
+const STEPS: [u32; 4] = [3_679_390_609, 3_152_041_523, 2_700_274_806, 2_313_257_605];
 
 /// Rays of every element that are cast together.
 pub const RAYS_PER_PASS: u32 = 16;
@@ -40,72 +35,67 @@ pub const RAYS_PER_PASS: u32 = 16;
 /// Rays through a scene that end in elements of its mesh.
 #[derive(Debug)]
 pub struct Rays<'a> {
+    mesh: Mesh<'a>,
     bvh: &'a Bvh,
     locator: Locator<'a>,
-    /// A length that passes everything.
-    far: f32,
+}
+
+/// A point of the sequence without its shift: the same for every element.
+#[derive(Clone, Copy, Default)]
+struct Step {
+    place: [u32; 2],
+    share: u32,
+    /// Cosine and sine of the angle about the normal.
+    turn: Vec2,
+}
+
+impl Step {
+    fn new(index: u32) -> Self {
+        let [s, t, share, turn] = STEPS.map(|step| index.wrapping_mul(step));
+        Self {
+            place: [s, t],
+            share,
+            turn: Vec2::from_angle(TAU * noise::fraction(turn)),
+        }
+    }
 }
 
 impl<'a> Rays<'a> {
-    /// Rays through a mesh; `far` is a distance at which every surface has been passed, in m.
+    /// Rays through a mesh and the surfaces that it was made of.
     #[must_use]
-    pub fn new(mesh: Mesh<'a>, bvh: &'a Bvh, far: f32) -> Self {
+    pub fn new(mesh: Mesh<'a>, bvh: &'a Bvh) -> Self {
         Self {
+            mesh,
             bvh,
             locator: Locator::new(mesh),
-            far,
         }
     }
 
-    /// The element in which a ray ends; `None` when it escapes or is absorbed.
-    fn element(&self, from: Vec3, direction: Vec3) -> Option<u32> {
-        let hit = self.bvh.nearest(from, from + direction * self.far)?;
-        let side = if hit.front { Side::Front } else { Side::Back };
-        let position = from + direction * (self.far * hit.fraction);
-        self.locator.element(hit.surface, side, position)
+    /// Casts a ray for every step from an element, and notes where each ends.
+    fn cast(&self, polygon: &Polygon, id: u32, steps: &[Step], hits: &mut [u32]) {
+        let [s, t, share, turn] = [0, 1, 2, 3].map(|axis| noise::bits(u64::from(id) * 4 + axis));
+        let normal = polygon.normal();
+        let (x, y) = normal.any_orthonormal_pair();
+        let first = Vec2::from_angle(TAU * noise::fraction(turn));
+        let mut caster = self.bvh.caster();
+        for (hit, step) in hits.iter_mut().zip(steps) {
+            let place = [s.wrapping_add(step.place[0]), t.wrapping_add(step.place[1])];
+            let (point, _) = from_unit_square(polygon, Vec2::from(place.map(noise::fraction)));
+            let from = lifted(polygon, point);
+
+            // About the normal, with a density of the cosine over pi.
+            let share = noise::fraction(share.wrapping_add(step.share));
+            let across = first.rotate(step.turn) * share.sqrt();
+            let direction = x * across.x + y * across.y + normal * (1.0 - share).sqrt();
+
+            let element = caster.nearest(from, direction).and_then(|met| {
+                let side = if met.front { Side::Front } else { Side::Back };
+                let end = from + direction * met.distance;
+                self.locator.element(met.surface, side, end)
+            });
+            *hit = element.unwrap_or(NOTHING);
+        }
     }
-
-    /// The elements that `count` rays from a point see, the `first` of a sequence left out.
-    pub fn from_point(
-        &self,
-        point: Vec3,
-        normal: Vec3,
-        seed: u64,
-        count: u32,
-    ) -> impl Iterator<Item = Option<u32>> + '_ {
-        let shift = shift(seed);
-        (0..count).map(move |index| {
-            let [_, _, u, v] = sequence(index, shift);
-            self.element(point, cosine_direction(normal, u, v))
-        })
-    }
-
-    fn cast_from(&self, polygon: &Polygon, seed: u64, index: u32) -> u32 {
-        let [s, t, u, v] = sequence(index, shift(seed));
-        let (point, _) = from_unit_square(polygon, Vec2::new(s, t));
-        let element = self.element(point, cosine_direction(polygon.normal(), u, v));
-        element.unwrap_or(NOTHING)
-    }
-}
-
-/// Point `index` of the sequence.
-fn sequence(index: u32, shift: [f32; 4]) -> [f32; 4] {
-    let mut point = shift;
-    for (value, step) in point.iter_mut().zip(STEPS) {
-        *value = (f64::from(*value) + f64::from(index) * step).fract() as f32;
-    }
-    point
-}
-
-fn shift(seed: u64) -> [f32; 4] {
-    [0, 1, 2, 3].map(|axis| noise::unit(seed.wrapping_mul(4).wrapping_add(axis)))
-}
-
-/// A direction about a unit normal whose density is the cosine over pi.
-fn cosine_direction(normal: Vec3, u: f32, v: f32) -> Vec3 {
-    let (x, y) = normal.any_orthonormal_pair();
-    let (sine, cosine) = (TAU * v).sin_cos();
-    (x * cosine + y * sine) * u.sqrt() + normal * (1.0 - u).sqrt()
 }
 
 /// Where the rays of every element end.
@@ -132,18 +122,20 @@ impl Hits {
     }
 
     /// Casts [`RAYS_PER_PASS`] more rays from every element.
-    pub fn cast(&mut self, mesh: &Mesh, rays: &Rays) {
+    pub fn cast(&mut self, rays: &Rays) {
         let first = self.passes.len() as u32 * RAYS_PER_PASS;
+        let steps: Vec<Step> = (first..)
+            .take(RAYS_PER_PASS as usize)
+            .map(Step::new)
+            .collect();
+        let mesh = rays.mesh;
         let mut hits = vec![NOTHING; mesh.elements.len() * RAYS_PER_PASS as usize];
         hits.par_chunks_mut(RAYS_PER_PASS as usize)
             .zip(mesh.elements)
             .enumerate()
             .for_each(|(id, (hits, element))| {
-                let Some(polygon) = mesh.element_polygon(element) else {
-                    return;
-                };
-                for (hit, index) in hits.iter_mut().zip(first..) {
-                    *hit = rays.cast_from(&polygon, id as u64, index);
+                if let Some(polygon) = mesh.element_polygon(element) {
+                    rays.cast(&polygon, id as u32, &steps, hits);
                 }
             });
         self.passes.push(hits);

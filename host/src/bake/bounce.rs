@@ -1,7 +1,6 @@
 //! Bounces that elements gather by rays.
 
 use relume::color::Rgb;
-use relume::luminaire;
 use relume::refine::Lanes;
 
 use super::direct::{self, DirectRow, lamp_count};
@@ -36,7 +35,7 @@ pub(super) fn gather(job: &mut Job, mesh: OwnedMesh, bvh: &Bvh) -> Result<Solved
         Ok(())
     })?;
     light.bounce(&mesh, &Hits::default(), job.settings.residual);
-    let rays = Rays::new(view, bvh, luminaire::far(job.scene));
+    let rays = Rays::new(view, bvh);
     let mut hits = Hits::default();
     let mut next_look = FIRST_LOOK;
     while lamps.are_complete && (hits.passes() as u32) < passes {
@@ -44,7 +43,7 @@ pub(super) fn gather(job: &mut Job, mesh: OwnedMesh, bvh: &Bvh) -> Result<Solved
         if job.ends(rows, most, light.residual()) {
             break;
         }
-        hits.cast(&view, &rays);
+        hits.cast(&rays);
         if hits.passes() as u32 == next_look.min(passes) {
             light.bounce(&mesh, &hits, job.settings.residual);
             if light.noise(&mesh, &hits) <= job.settings.noise {
