@@ -3,7 +3,7 @@
 //! Rooms of 12, 100 and 1000 polygons, the smallest the paper's (without lamps), the others the
 //! same with small squares that float in it. `row` are rays as a row of form factors asks for them,
 //! from 64 points next to each other to 16 points of one patch; `scattered` run between
-//! places all over the room.
+//! places all over the room. `nearest` are rays that elements gather by, for the surface they meet.
 
 mod scenes;
 
@@ -14,10 +14,13 @@ use relume::geometry::from_unit_square;
 use relume::scene::Surface;
 use relume::visibility::{Occluders, Visibility};
 use relume_host::builtin::PaperLamps;
-use relume_host::bvh::Bvh;
+use relume_host::bvh::{Bvh, lifted};
 
 /// Rays of one set.
 const RAYS: u32 = 1024;
+
+/// Rays of a set that is too long to be learnt by heart by a processor.
+const GATHERED: u32 = 1 << 14;
 
 /// Edge of the room, in m.
 const ROOM: f32 = 3.0;
@@ -33,6 +36,14 @@ fn main() {
         let surfaces = cluttered_room(polygons);
         compare(&mut criterion, "row", &surfaces, &row_rays(&surfaces));
         compare(&mut criterion, "scattered", &surfaces, &scattered_rays());
+    }
+    measure_nearest(
+        &mut criterion,
+        "Cornell box",
+        &scenes::cornell().scene.surfaces,
+    );
+    for polygons in [20, 100, 1000, 10_000] {
+        measure_nearest(&mut criterion, "room", &cluttered_room(polygons));
     }
     criterion.final_summary();
 }
@@ -58,6 +69,34 @@ fn count_open(visibility: &impl Visibility, segments: &[Segment]) -> usize {
         .iter()
         .filter(|(from, to)| visibility.sees(*from, *to));
     open.count()
+}
+
+/// Rays as elements gather by them, one by one: about the normal of a place on any surface.
+fn measure_nearest(criterion: &mut Criterion, scene: &str, surfaces: &[Surface]) {
+    let bvh = Bvh::new(surfaces, 100.0);
+    let rays: Vec<(Vec3, Vec3)> = (0..GATHERED)
+        .map(|ray| gathered_ray(surfaces, ray))
+        .collect();
+    let mut group = criterion.benchmark_group("visibility/nearest");
+    group.throughput(Throughput::Elements(rays.len() as u64));
+    group.bench_function(BenchmarkId::new(scene, surfaces.len()), |bencher| {
+        bencher.iter(|| {
+            let mut caster = bvh.caster();
+            let hits = rays
+                .iter()
+                .filter(|(from, direction)| caster.nearest(*from, *direction).is_some());
+            hits.count()
+        });
+    });
+    group.finish();
+}
+
+fn gathered_ray(surfaces: &[Surface], ray: u32) -> (Vec3, Vec3) {
+    let polygon = surfaces[ray as usize % surfaces.len()].polygon();
+    let start = from_unit_square(polygon, scatter(2 * ray).truncate()).0;
+    let at = scatter(2 * ray + 1) * 2.0 - 1.0;
+    let direction = (polygon.normal() + at.normalize()).normalize();
+    (lifted(polygon, start), direction)
 }
 
 /// The paper's room with as many floating squares as make up the number of polygons.

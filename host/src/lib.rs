@@ -6,6 +6,8 @@ pub mod file;
 
 pub mod noise;
 
+pub mod linear;
+
 pub mod texture;
 
 pub mod scene;

@@ -1,12 +1,24 @@
 //! Numbers that look random and are the same every time.
 
-/// A number in [0, 1) for every seed: SplitMix64 (Steele, Lea and Flood 2014), top 24 bits.
+/// A number in [0, 1) for every seed.
 #[must_use]
 pub fn unit(seed: u64) -> f32 {
+    fraction(bits(seed))
+}
+
+/// Parts of 2^32, as a number in [0, 1): the top 24 bits.
+#[must_use]
+pub fn fraction(parts: u32) -> f32 {
+    (parts >> 8) as f32 / (1_u32 << 24) as f32
+}
+
+/// Bits for every seed: SplitMix64 (Steele, Lea and Flood 2014), the top ones.
+#[must_use]
+pub fn bits(seed: u64) -> u32 {
     let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 40) as f32 / (1_u32 << 24) as f32
+    ((z ^ (z >> 31)) >> 32) as u32
 }
 
 #[cfg(test)]

@@ -1,7 +1,6 @@
 //! Bounces that elements gather by rays.
 
 use relume::color::Rgb;
-use relume::luminaire;
 use relume::refine::Lanes;
 
 use super::direct::{self, DirectRow, DirectSource, Lamps};
@@ -48,7 +47,7 @@ pub(super) fn gather(
         },
     )?;
     light.bounce(&mesh, &Hits::default(), job.settings.residual);
-    let rays = Rays::new(view, bvh, luminaire::far(job.scene));
+    let rays = Rays::new(view, bvh);
     let mut hits = Hits::default();
     let mut next_look = FIRST_LOOK;
     while lamps.is_complete && (hits.passes() as u32) < passes {
@@ -56,7 +55,7 @@ pub(super) fn gather(
         if job.ends(rows, most, light.residual()) {
             break;
         }
-        hits.cast(&view, &rays);
+        hits.cast(&rays);
         if hits.passes() as u32 == next_look.min(passes) {
             light.bounce(&mesh, &hits, job.settings.residual);
             if light.estimate(&mesh, &hits) <= job.settings.noise {
@@ -261,7 +260,8 @@ fn by_element(blocks: &[Vec<Lanes<LANES>>], lights: usize) -> Vec<Rgb> {
     let value = |element: usize, light: usize| {
         let [r, g, b] = &blocks[light / LANES][element];
         let lane = light % LANES;
-        Rgb::new(r[lane], g[lane], b[lane])
+        // A solve leaves a rounding below zero in the dark.
+        Rgb::new(r[lane].max(0.0), g[lane].max(0.0), b[lane].max(0.0))
     };
     (0..elements)
         .flat_map(|element| (0..lights).map(move |light| value(element, light)))

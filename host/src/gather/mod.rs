@@ -21,7 +21,7 @@ use relume::mesh::{Mesh, Side};
 use relume::refine::Lanes;
 use relume::refine::krylov::{self, Work};
 
-use crate::bvh::Bvh;
+use crate::bvh::{Bvh, Caster, lifted};
 use crate::mesh::Locator;
 use crate::noise;
 
@@ -30,13 +30,8 @@ pub use file::{RowsError, read, write};
 /// A ray that ends in no element.
 const NOTHING: u32 = u32::MAX;
 
-/// `1/g, 1/g^2, 1/g^3, 1/g^4` with `g^5 = g + 1`.
-const STEPS: [f64; 4] = [
-    0.856_674_883_854_502_9,
-    0.733_891_856_627_126,
-    0.628_706_721_037_808_6,
-    0.538_597_257_223_61,
-];
+/// `1/g, 1/g^2, 1/g^3, 1/g^4` with `g^5 = g + 1`, in parts of 2^32.
+const STEPS: [u32; 4] = [3_679_390_609, 3_152_041_523, 2_700_274_806, 2_313_257_605];
 
 /// Rays of every element that are cast together.
 pub const RAYS_PER_PASS: u32 = 16;
@@ -55,78 +50,104 @@ pub struct End {
 /// Rays through a scene that end in elements of its mesh.
 #[derive(Debug)]
 pub struct Rays<'a> {
+    mesh: Mesh<'a>,
     bvh: &'a Bvh,
     locator: Locator<'a>,
-    /// A length that passes everything.
-    far: f32,
+}
+
+/// A point of the sequence without its shift: the same for every element.
+#[derive(Clone, Copy, Default)]
+struct Step {
+    place: [u32; 2],
+    share: u32,
+    /// Cosine and sine of the angle about the normal.
+    turn: Vec2,
+}
+
+impl Step {
+    fn new(index: u32) -> Self {
+        let [s, t, share, turn] = STEPS.map(|step| index.wrapping_mul(step));
+        Self {
+            place: [s, t],
+            share,
+            turn: Vec2::from_angle(TAU * noise::fraction(turn)),
+        }
+    }
+
+    /// The part of a direction that is across the normal, with a density of the cosine over pi, for
+    /// a receiver whose sequence is shifted by `share` and turned by `first`.
+    fn across(&self, share: u32, first: Vec2) -> Vec2 {
+        let share = noise::fraction(share.wrapping_add(self.share));
+        first.rotate(self.turn) * share.sqrt()
+    }
 }
 
 impl<'a> Rays<'a> {
-    /// Rays through a mesh; `far` is a distance at which every surface has been passed, in m.
+    /// Rays through a mesh and the surfaces that it was made of.
     #[must_use]
-    pub fn new(mesh: Mesh<'a>, bvh: &'a Bvh, far: f32) -> Self {
+    pub fn new(mesh: Mesh<'a>, bvh: &'a Bvh) -> Self {
         Self {
+            mesh,
             bvh,
             locator: Locator::new(mesh),
-            far,
+        }
+    }
+
+    /// Where `count` cosine-weighted rays from a point of a polygon end, on the side of its front; the
+    /// `seed` turns them. `None` for a ray that escapes or is absorbed.
+    pub fn from_point(
+        &self,
+        polygon: &Polygon,
+        point: Vec3,
+        seed: u64,
+        count: u32,
+    ) -> impl Iterator<Item = Option<End>> + '_ {
+        let [share, turn] = [0, 1].map(|axis| noise::bits(seed * 2 + axis));
+        let first = Vec2::from_angle(TAU * noise::fraction(turn));
+        let normal = polygon.normal();
+        let (x, y) = normal.any_orthonormal_pair();
+        let from = lifted(polygon, point);
+        let mut caster = self.bvh.caster();
+        (0..count).map(move |index| {
+            let step = Step::new(index);
+            let across = step.across(share, first);
+            let up = (1.0 - across.length_squared()).max(0.0).sqrt();
+            let direction = x * across.x + y * across.y + normal * up;
+            self.end(&mut caster, from, direction)
+        })
+    }
+
+    /// Casts a ray for every step from an element, and notes where each ends.
+    fn cast(&self, polygon: &Polygon, id: u32, steps: &[Step], hits: &mut [u32]) {
+        let [s, t, share, turn] = [0, 1, 2, 3].map(|axis| noise::bits(u64::from(id) * 4 + axis));
+        let normal = polygon.normal();
+        let (x, y) = normal.any_orthonormal_pair();
+        let first = Vec2::from_angle(TAU * noise::fraction(turn));
+        let mut caster = self.bvh.caster();
+        for (hit, step) in hits.iter_mut().zip(steps) {
+            let place = [s.wrapping_add(step.place[0]), t.wrapping_add(step.place[1])];
+            let (point, _) = from_unit_square(polygon, Vec2::from(place.map(noise::fraction)));
+            let from = lifted(polygon, point);
+            let across = step.across(share, first);
+            let up = (1.0 - across.length_squared()).max(0.0).sqrt();
+            let direction = x * across.x + y * across.y + normal * up;
+            let end = self.end(&mut caster, from, direction);
+            *hit = end.map_or(NOTHING, |end| end.element);
         }
     }
 
     /// Where a ray meets an element; `None` when it escapes or is absorbed.
-    fn end(&self, from: Vec3, direction: Vec3) -> Option<End> {
-        let hit = self.bvh.nearest(from, from + direction * self.far)?;
-        let side = if hit.front { Side::Front } else { Side::Back };
-        let distance = self.far * hit.fraction;
-        let position = from + direction * distance;
-        let element = self.locator.element(hit.surface, side, position)?;
+    fn end(&self, caster: &mut Caster, from: Vec3, direction: Vec3) -> Option<End> {
+        let met = caster.nearest(from, direction)?;
+        let side = if met.front { Side::Front } else { Side::Back };
+        let position = from + direction * met.distance;
+        let element = self.locator.element(met.surface, side, position)?;
         Some(End {
             element,
             position,
-            distance,
+            distance: met.distance,
         })
     }
-
-    /// Where `count` cosine-weighted rays from a point end.
-    pub fn from_point(
-        &self,
-        point: Vec3,
-        normal: Vec3,
-        seed: u64,
-        count: u32,
-    ) -> impl Iterator<Item = Option<End>> + '_ {
-        let shift = shift(seed);
-        (0..count).map(move |index| {
-            let [_, _, u, v] = sequence(index, shift);
-            self.end(point, cosine_direction(normal, u, v))
-        })
-    }
-
-    fn cast_from(&self, polygon: &Polygon, seed: u64, index: u32) -> u32 {
-        let [s, t, u, v] = sequence(index, shift(seed));
-        let (point, _) = from_unit_square(polygon, Vec2::new(s, t));
-        let end = self.end(point, cosine_direction(polygon.normal(), u, v));
-        end.map_or(NOTHING, |end| end.element)
-    }
-}
-
-/// Point `index` of the sequence.
-fn sequence(index: u32, shift: [f32; 4]) -> [f32; 4] {
-    let mut point = shift;
-    for (value, step) in point.iter_mut().zip(STEPS) {
-        *value = (f64::from(*value) + f64::from(index) * step).fract() as f32;
-    }
-    point
-}
-
-fn shift(seed: u64) -> [f32; 4] {
-    [0, 1, 2, 3].map(|axis| noise::unit(seed.wrapping_mul(4).wrapping_add(axis)))
-}
-
-/// A direction about a unit normal whose density is the cosine over pi.
-fn cosine_direction(normal: Vec3, u: f32, v: f32) -> Vec3 {
-    let (x, y) = normal.any_orthonormal_pair();
-    let (sine, cosine) = (TAU * v).sin_cos();
-    (x * cosine + y * sine) * u.sqrt() + normal * (1.0 - u).sqrt()
 }
 
 /// Where the rays of every element end.
@@ -153,18 +174,20 @@ impl Hits {
     }
 
     /// Casts [`RAYS_PER_PASS`] more rays from every element.
-    pub fn cast(&mut self, mesh: &Mesh, rays: &Rays) {
+    pub fn cast(&mut self, rays: &Rays) {
         let first = self.passes.len() as u32 * RAYS_PER_PASS;
+        let steps: Vec<Step> = (first..)
+            .take(RAYS_PER_PASS as usize)
+            .map(Step::new)
+            .collect();
+        let mesh = rays.mesh;
         let mut hits = vec![NOTHING; mesh.elements.len() * RAYS_PER_PASS as usize];
         hits.par_chunks_mut(RAYS_PER_PASS as usize)
             .zip(mesh.elements)
             .enumerate()
             .for_each(|(id, (hits, element))| {
-                let Some(polygon) = mesh.element_polygon(element) else {
-                    return;
-                };
-                for (hit, index) in hits.iter_mut().zip(first..) {
-                    *hit = rays.cast_from(&polygon, id as u64, index);
+                if let Some(polygon) = mesh.element_polygon(element) {
+                    rays.cast(&polygon, id as u32, &steps, hits);
                 }
             });
         self.passes.push(hits);

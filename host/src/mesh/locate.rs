@@ -1,20 +1,26 @@
 //! The element at a point of a face, found by its parameters.
 
-use std::collections::HashMap;
-
 use glam::{Vec2, Vec3};
 use relume::mesh::{Face, Mesh, Side};
+
+use crate::linear::{Linear, parameter_gradients, span};
 
 /// The faces of a mesh by surface and side, with the shape of their grids.
 #[derive(Clone, Debug)]
 pub struct Locator<'a> {
-    grids: HashMap<(u32, Side), Grid<'a>>,
+    /// Front and back of every surface.
+    grids: Vec<[Option<Grid<'a>>; 2]>,
 }
 
-/// A face whose elements are the cells of a grid.
+/// A face whose elements are the cells of a grid, with what each ray asks of it close together.
 #[derive(Clone, Copy, Debug)]
 struct Grid<'a> {
     face: &'a Face,
+    /// The face's parameters, where they are linear.
+    parameters: Option<[Linear; 2]>,
+    is_triangle: bool,
+    first_element: u32,
+    element_count: u32,
     columns: u32,
     rows: u32,
 }
@@ -23,44 +29,76 @@ impl<'a> Locator<'a> {
     /// Reads the grids off the elements' corners.
     #[must_use]
     pub fn new(mesh: Mesh<'a>) -> Self {
-        let grids = mesh.faces.iter().map(|face| {
-            let range = face.element_range();
-            let elements = mesh.elements.get(range.start as usize..range.end as usize);
-            let first = elements.and_then(<[_]>::first);
-            let parts = first.map_or(Vec2::ONE, |element| (element.to - element.from).recip());
-            let grid = Grid {
-                face,
-                columns: parts.x.round() as u32,
-                rows: parts.y.round() as u32,
-            };
-            ((face.surface, face.side), grid)
-        });
-        Self {
-            grids: grids.collect(),
+        let surfaces = mesh.faces.iter().map(|face| face.surface as usize + 1);
+        let mut grids = vec![[None; 2]; surfaces.max().unwrap_or(0)];
+        for face in mesh.faces {
+            grids[face.surface as usize][side_index(face.side)] = Some(Grid::new(&mesh, face));
         }
+        Self { grids }
+    }
+
+    fn grid(&self, surface: u32, side: Side) -> Option<&Grid<'a>> {
+        self.grids.get(surface as usize)?[side_index(side)].as_ref()
     }
 
     /// The face on one side of a surface; `None` when the mesh has none.
     #[must_use]
     pub fn face(&self, surface: u32, side: Side) -> Option<&'a Face> {
-        Some(self.grids.get(&(surface, side))?.face)
+        Some(self.grid(surface, side)?.face)
     }
 
     /// The element that holds a point of a face, or the nearest; `None` where there are none.
     #[must_use]
     pub fn element(&self, surface: u32, side: Side, position: Vec3) -> Option<u32> {
-        let grid = self.grids.get(&(surface, side))?;
-        if grid.face.element_count == 0 {
+        let grid = self.grid(surface, side)?;
+        if grid.element_count == 0 {
             return None;
         }
-        let at = grid.face.polygon.parameters(position);
-        let cell = if grid.face.polygon.is_triangle() {
+        let at = grid.parameters(position);
+        let cell = if grid.is_triangle {
             triangle_cell(at, grid.columns)
         } else {
             let column = cell_of(at.x, grid.columns);
             cell_of(at.y, grid.rows) * grid.columns + column
         };
-        Some(grid.face.first_element + cell.min(grid.face.element_count - 1))
+        Some(grid.first_element + cell.min(grid.element_count - 1))
+    }
+}
+
+impl<'a> Grid<'a> {
+    fn new(mesh: &Mesh<'a>, face: &'a Face) -> Self {
+        let range = face.element_range();
+        let elements = mesh.elements.get(range.start as usize..range.end as usize);
+        let first = elements.and_then(<[_]>::first);
+        let parts = first.map_or(Vec2::ONE, |element| (element.to - element.from).recip());
+        let parameters = span(&face.polygon).map(|corners| {
+            let corners = corners.map(Vec3::as_dvec3);
+            let [origin, ..] = corners;
+            parameter_gradients(corners).map(|gradient| Linear::new(gradient, origin, 0.0))
+        });
+        Self {
+            face,
+            parameters,
+            is_triangle: face.polygon.is_triangle(),
+            first_element: face.first_element,
+            element_count: face.element_count,
+            columns: parts.x.round() as u32,
+            rows: parts.y.round() as u32,
+        }
+    }
+
+    fn parameters(&self, position: Vec3) -> Vec2 {
+        match self.parameters {
+            Some([s, t]) => Vec2::new(s.at(position), t.at(position)),
+            None => self.face.polygon.parameters(position),
+        }
+    }
+}
+
+const fn side_index(side: Side) -> usize {
+    match side {
+        Side::Front => 0,
+        Side::Back => 1,
     }
 }
 

@@ -23,7 +23,7 @@ use relume::scene::{Scene, Source};
 use relume::visibility::Visibility;
 
 use super::{BuildError, OwnedMesh};
-use crate::bvh::{Bvh, Hit};
+use crate::bvh::{Bvh, Hit, lifted};
 use crate::noise;
 
 /// Walks that start at each part.
@@ -138,6 +138,19 @@ const GRAZING: f32 = 1e-3;
 struct Place {
     position: Vec3,
     normal: Vec3,
+    /// Where rays start.
+    start: Vec3,
+}
+
+impl Place {
+    /// A point on the front of a polygon.
+    fn new(polygon: &Polygon, position: Vec3) -> Self {
+        Self {
+            position,
+            normal: polygon.normal(),
+            start: lifted(polygon, position),
+        }
+    }
 }
 
 /// A scene as a walker sees it.
@@ -177,10 +190,7 @@ impl<'a> Surroundings<'a> {
             for cast in 0..CASTS {
                 let seed = (number * CASTS + cast) * 4;
                 let at = Vec2::new(noise::unit(seed), noise::unit(seed + 1));
-                let start = Place {
-                    position: from_unit_square(lamp, at).0,
-                    normal: lamp.normal(),
-                };
+                let start = Place::new(lamp, from_unit_square(lamp, at).0);
                 lit.extend(self.next(start, seed + 2));
             }
         }
@@ -228,10 +238,7 @@ impl<'a> Surroundings<'a> {
         let points = gauss_points(polygon);
         let leads_to_light = |walk: &u64| {
             let seed = (u64::from(part) * WALKS + walk) * LONGEST_WALK;
-            let mut place = Place {
-                position: points[*walk as usize % points.len()].position,
-                normal: polygon.normal(),
-            };
+            let mut place = Place::new(polygon, points[*walk as usize % points.len()].position);
             for step in 0..LONGEST_WALK {
                 let seed = (seed + step) * (2 + 4 * GLANCES);
                 if self.is_lit(place, seed + 2) {
@@ -254,44 +261,38 @@ impl<'a> Surroundings<'a> {
         let (share, angle) = (noise::unit(seed), TAU * noise::unit(seed + 1));
         let across = u * angle.cos() + v * angle.sin();
         let ray = across * share.sqrt() + place.normal * (1.0 - share).sqrt();
-        self.end_of(place.position, ray)
+        self.end_of(place.start, ray)
     }
 
     /// Where a ray meets a side that reflects; `None` when it escapes or is absorbed.
     fn end_of(&self, from: Vec3, ray: Vec3) -> Option<Place> {
         let Hit {
             surface,
-            fraction,
+            distance,
             front,
-        } = self.bvh.nearest(from, from + ray * self.far)?;
+        } = self.bvh.caster().nearest(from, ray)?;
         let surface = &self.scene.surfaces()[surface as usize];
         let side = if front { Side::Front } else { Side::Back };
         let reflects = is_face(surface, side) && !surface.reflectance().is_black();
         let polygon = surface.polygon();
-        let position = from + ray * (self.far * fraction);
-        reflects.then(|| Place {
-            position: position + (polygon.center() - position) * INWARDS,
-            normal: if front {
-                polygon.normal()
-            } else {
-                -polygon.normal()
-            },
-        })
+        let polygon = if front { *polygon } else { polygon.flipped() };
+        let position = from + ray * distance;
+        let inside = position + (polygon.center() - position) * INWARDS;
+        reflects.then(|| Place::new(&polygon, inside))
     }
 
     /// True when a point gets light: from a luminaire, a lamp or a lit point.
     fn is_lit(&self, place: Place, seed: u64) -> bool {
-        let Place { position, normal } = place;
+        let Place {
+            position, normal, ..
+        } = place;
         some_of(self.scene.luminaires(), LIGHTS_PER_PLACE, seed).any(|(_, l)| {
             luminaire::at_point(l.source(), position, normal, self.far, 1, self.bvh) > 0.0
         }) || (0..GLANCES).any(|glance| {
             let seed = seed + 4 * glance;
             let lamp = pick(&self.lamps, seed).map(|lamp| {
                 let at = Vec2::new(noise::unit(seed + 1), noise::unit(seed + 2));
-                Place {
-                    position: from_unit_square(lamp, at).0,
-                    normal: lamp.normal(),
-                }
+                Place::new(lamp, from_unit_square(lamp, at).0)
             });
             let lit = pick(&self.lit, seed + 3).copied();
             lamp.is_some_and(|lamp| self.exchange(place, lamp))

@@ -55,6 +55,8 @@ const TRIES: u64 = 8;
 pub(super) struct Spot {
     position: Vec3,
     normal: Vec3,
+    /// Its polygon, front towards the side.
+    outline: Polygon,
 }
 
 /// A solution, ready to be gathered from.
@@ -95,14 +97,16 @@ impl<'a> Gatherer<'a> {
     /// The point of a side nearest to a position.
     pub fn spot(&self, surface: u32, side: Side, position: Vec3) -> Option<Spot> {
         let outline = self.solution.surfaces.get(surface as usize)?;
+        let outline = match side {
+            Side::Front => *outline,
+            Side::Back => outline.flipped(),
+        };
         let (height, _) = outline.height(position);
         let foot = position - outline.normal() * height;
         Some(Spot {
             position: foot + (outline.center() - foot) * INWARDS,
-            normal: match side {
-                Side::Front => outline.normal(),
-                Side::Back => -outline.normal(),
-            },
+            normal: outline.normal(),
+            outline,
         })
     }
 
@@ -116,10 +120,13 @@ impl<'a> Gatherer<'a> {
         values
     }
 
-    fn direct(&self, Spot { position, normal }: Spot) -> Vec<Rgb> {
+    fn direct(&self, spot: Spot) -> Vec<Rgb> {
+        let Spot {
+            position, normal, ..
+        } = spot;
         let mut values = vec![Rgb::BLACK; self.solution.lights.len()];
         for (lamp, emission) in &self.lamps {
-            let factor = self.lamp_factor(lamp, Spot { position, normal }, 0);
+            let factor = self.lamp_factor(lamp, spot, 0);
             values[emission.light as usize] += emission.share * factor;
         }
         for luminaire in &self.solution.luminaires {
@@ -132,7 +139,9 @@ impl<'a> Gatherer<'a> {
 
     /// What the place sees of a lamp; where much stands between, of its quarters.
     fn lamp_factor(&self, lamp: &Shooter, spot: Spot, depth: u32) -> f32 {
-        let Spot { position, normal } = spot;
+        let Spot {
+            position, normal, ..
+        } = spot;
         match lamp.exact_at_point(position, normal, &self.bvh) {
             Some(factor) => factor,
             None if depth == MOST_QUARTERINGS => lamp.at_point(position, normal, &self.bvh),
@@ -143,7 +152,10 @@ impl<'a> Gatherer<'a> {
         }
     }
 
-    fn add_far(&self, Spot { position, normal }: Spot, values: &mut [Rgb]) {
+    fn add_far(&self, spot: Spot, values: &mut [Rgb]) {
+        let Spot {
+            position, normal, ..
+        } = spot;
         for patch in &self.patches {
             if patch.is_far(position) {
                 let factor = patch.shooter.at_point(position, normal, &self.bvh);
@@ -158,8 +170,8 @@ impl<'a> Gatherer<'a> {
 
     fn add_near(&self, spot: Spot, seed: u64, values: &mut [Rgb]) {
         let mesh = self.solution.mesh.view();
-        let rays = Rays::new(mesh, &self.bvh, self.far);
-        let ends = rays.from_point(spot.position, spot.normal, seed, RAYS);
+        let rays = Rays::new(mesh, &self.bvh);
+        let ends = rays.from_point(&spot.outline, spot.position, seed, RAYS);
         for (end, number) in ends.zip(seed * u64::from(RAYS)..) {
             let Some((end, element)) = end.and_then(|end| {
                 let element = mesh.elements.get(end.element as usize)?;
@@ -195,6 +207,7 @@ impl<'a> Gatherer<'a> {
         Spot {
             position: position + (outline.center() - position) * END_INWARDS,
             normal: outline.normal(),
+            outline: *outline,
         }
     }
 
@@ -205,7 +218,10 @@ impl<'a> Gatherer<'a> {
     }
 
     /// Direct irradiance by one shadow ray to each lamp and luminaire; the sky's as the element has it.
-    fn direct_at(&self, Spot { position, normal }: Spot, seed: u64) -> Vec<Rgb> {
+    fn direct_at(&self, spot: Spot, seed: u64) -> Vec<Rgb> {
+        let Spot {
+            position, normal, ..
+        } = spot;
         let mut values = vec![Rgb::BLACK; self.solution.lights.len()];
         for (lamp, emission) in &self.lamps {
             let factor = lamp.open_at_point(position, normal);

@@ -582,7 +582,7 @@ mod tests {
             .position(|f| f.emission.is_none());
         let unlit = faces + 32 * black.unwrap();
         for (at, value, what, index) in [
-            (10, [2, 0, 0, 0], "flags", 2),
+            (10, [4, 0, 0, 0], "flags", 4),
             (faces, [200, 0, 0, 0], "faces", 0),
             (faces + 4, [2, 0, 0, 0], "faces", 0),
             (faces + 24, [1, 0, 0, 0], "faces", 0),

@@ -192,6 +192,7 @@ impl Polygon {
     }
 
     /// The point with the parameters `at = (s, t)`.
+    #[inline]
     #[must_use]
     pub fn point(&self, at: Vec2) -> Vec3 {
         let [a, b, c, d] = self.vertices;
@@ -203,6 +204,7 @@ impl Polygon {
     }
 
     /// Area per unit of parameter area at `at`, in m2 (constant on triangles and parallelograms).
+    #[inline]
     #[must_use]
     pub fn density(&self, at: Vec2) -> f32 {
         let [a, b, c, d] = self.vertices;

@@ -50,6 +50,8 @@ pub fn gauss_points(polygon: &Polygon) -> Vec<SamplePoint, 4> {
 
 /// Maps the unit square to the polygon so that equal areas stay equal on triangles and
 /// parallelograms; on other quads [`Polygon::density`] tells by how much they do not.
+// Inlined, like what it calls: who drops the density does not pay for it.
+#[inline]
 #[must_use]
 pub fn from_unit_square(polygon: &Polygon, at: Vec2) -> (Vec3, f32) {
     if !polygon.is_triangle() {

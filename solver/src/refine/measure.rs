@@ -114,9 +114,10 @@ impl<const K: usize> Refinement<'_, K> {
         }
         let (block, lane) = address::<K>(light);
         let index = block * self.mesh.elements.len() + element as usize;
-        lanes
-            .get(index)
-            .map_or(Rgb::BLACK, |lanes| lane_of(lanes, lane))
+        // The solve for known rows leaves a rounding below zero in the dark.
+        lanes.get(index).map_or(Rgb::BLACK, |lanes| {
+            lane_of(lanes, lane).map(|value| value.max(0.0))
+        })
     }
 
     /// Rows handed in so far; without row storage a patch may count more than once.

@@ -1,8 +1,13 @@
 //! Visibility through a bounding volume hierarchy: the same answer as
-//! [`relume::visibility::Occluders`], faster where there are many surfaces.
+//! [`relume::visibility::Occluders`], faster where there are many surfaces; and the nearest surface
+//! along a ray.
 //!
-//! The tree comes from `obvhs` and is built on one thread, so it is the same every time; leaves ask
-//! [`Polygon::crossing`], so a segment is blocked here exactly when it is blocked on a device.
+//! Trees come from `obvhs` and are built on one thread, so they are the same every time. For visibility
+//! leaves ask [`Polygon::crossing`], so a segment is blocked here exactly when it is blocked on a
+//! device; rays have a kernel of their own ([`Caster`]).
+
+mod facet;
+mod nearest;
 
 use std::time::Duration;
 
@@ -10,13 +15,16 @@ use glam::{Vec3, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
-use obvhs::ray::{Ray, RayHit};
+use obvhs::ray::Ray;
 use obvhs::{Boundable, BvhBuildParams};
 
 use relume::geometry::Polygon;
 use relume::luminaire;
 use relume::scene::{Scene, Source, Surface};
 use relume::visibility::{Bounds, Shaft, Visibility};
+
+pub use nearest::Caster;
+use nearest::Facets;
 
 /// Surfaces in a tree of boxes.
 pub struct Bvh {
@@ -25,6 +33,8 @@ pub struct Bvh {
     polygons: Vec<Polygon>,
     /// Number of the surface of each outline.
     surfaces: Vec<u32>,
+    /// The same surfaces as rays meet them that look for the nearest.
+    facets: Facets,
 }
 
 impl std::fmt::Debug for Bvh {
@@ -35,13 +45,13 @@ impl std::fmt::Debug for Bvh {
     }
 }
 
-/// The nearest surface along a segment.
+/// The nearest surface along a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// Number of the surface.
     pub surface: u32,
-    /// Where, as a fraction of the segment.
-    pub fraction: f32,
+    /// Where, in lengths of the ray's direction.
+    pub distance: f32,
     /// True when the front of the surface was met.
     pub front: bool,
 }
@@ -105,29 +115,28 @@ impl Bvh {
                 .collect(),
             surfaces: order,
             tree,
+            facets: Facets::new(surfaces, farthest),
         }
     }
 
-    /// The nearest surface that crosses the open segment.
+    /// Casts rays for their nearest surfaces. A surface on which a ray starts is met or not as
+    /// rounding has it, so rays should start at [`lifted`] points.
     #[must_use]
-    pub fn nearest(&self, from: Vec3, to: Vec3) -> Option<Hit> {
-        let mut hit = RayHit::none();
-        self.tree
-            .ray_traverse(segment(from, to), &mut hit, |_, index| {
-                self.crossing(index, from, to).unwrap_or(f32::INFINITY)
-            });
-        let index = hit.primitive_id as usize;
-        let polygon = self.polygons.get(index)?;
-        Some(Hit {
-            surface: *self.surfaces.get(index)?,
-            fraction: hit.t,
-            front: (to - from).dot(polygon.normal()) < 0.0,
-        })
+    pub const fn caster(&self) -> Caster<'_> {
+        Caster::new(&self.facets)
     }
 
     fn crossing(&self, index: usize, from: Vec3, to: Vec3) -> Option<f32> {
         self.polygons.get(index)?.crossing(from, to)
     }
+}
+
+/// A point of a polygon, above it by as much as counts as none: clear of the polygon itself and of
+/// all in its plane, on the side of its front.
+#[must_use]
+pub fn lifted(polygon: &Polygon, point: Vec3) -> Vec3 {
+    let (_, least) = polygon.height(point);
+    point + polygon.normal() * least
 }
 
 impl Bvh {
@@ -262,11 +271,6 @@ mod tests {
             for (from, to) in ends {
                 let (from, to) = (from * size, to * size);
                 prop_assert_eq!(bvh.sees(from, to), brute.sees(from, to), "{} {}", from, to);
-                let nearest = surfaces
-                    .iter()
-                    .filter_map(|s| s.polygon().crossing(from, to))
-                    .reduce(f32::min);
-                prop_assert_eq!(bvh.nearest(from, to).map(|hit| hit.fraction), nearest);
             }
         }
 
