@@ -68,7 +68,7 @@ impl<const K: usize> Refinement<'_, K> {
         }
         let landing = (self.area_landed / self.area_shot) as f32;
         let term = |power: f32, reflecting: f32| {
-            power / area * landing / (1.0 - landing * reflecting / area).max(f32::EPSILON)
+            power.max(0.0) / area * landing / (1.0 - landing * reflecting / area).max(f32::EPSILON)
         };
         Rgb::new(
             term(power.r, reflecting.r),
