@@ -603,6 +603,37 @@ fn threads_and_method_do_not_change_a_byte() {
 }
 
 #[test]
+fn no_output_replaces_a_file_of_another_kind() {
+    let folder = with_room();
+    let before = folder.files();
+    for (command, file) in [
+        ("bake room.obj -o room.mtl", "room.mtl"),
+        ("bake room.obj --keep-rows room.obj -o new", "room.obj"),
+        ("bake room.obj --keep-rows points.csv -o new", "points.csv"),
+        ("pack room.solution -o room.mtl", "room.mtl"),
+    ] {
+        let line = folder.refused(command);
+        assert!(line.contains(file), "{line}");
+    }
+    folder.misused("bake room.obj --keep-rows new -o new");
+    folder.misused("bake room.obj --residual 2 -o new");
+    folder.misused("probe room.solution --elements --gather");
+    assert!(folder.files() == before, "something was written");
+}
+
+#[cfg(unix)]
+#[test]
+fn names_that_are_no_text_are_written_all_the_same() {
+    use std::os::unix::ffi::OsStrExt as _;
+    let folder = with_room();
+    let name = std::ffi::OsStr::from_bytes(b"n\xff.atlas");
+    let mut command = folder.command("pack room.solution --json -o");
+    let output = command.arg(name).output().expect("relume starts");
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    assert!(folder.path().join(name).is_file());
+}
+
+#[test]
 fn a_light_that_changes_is_solved_again_as_in_a_whole_bake() {
     let folder = with_scene();
     folder.write("bulb.toml", BULB);

@@ -16,6 +16,9 @@ const MOST_PASSES: u32 = 64;
 /// Most bytes of what rays hit.
 const HIT_BYTES: usize = 2 << 30;
 
+/// Residual below which the bounces are always solved: a solve costs less than the rays.
+const LAX: f32 = 1e-3;
+
 /// Passes after which the noise is looked at for the first time; then whenever they have doubled.
 const FIRST_LOOK: u32 = 8;
 
@@ -175,7 +178,7 @@ impl Light {
         for block in &mut self.blocks {
             block.left.clone_from(&block.direct);
             if self.passes > 0 {
-                let bounced = hits.bounce(&mesh.view(), &block.direct, residual / 10.0);
+                let bounced = hits.bounce(&mesh.view(), &block.direct, residual.min(LAX) / 10.0);
                 (block.indirect, block.left) = (bounced.indirect, bounced.left);
             }
             block.measure(mesh);

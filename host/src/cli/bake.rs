@@ -11,7 +11,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use relume::color::Rgb;
 use serde_json::json;
 
-use super::{Outcome, human_bytes, keep, output_path, tell, write_file};
+use super::{Outcome, human_bytes, keep, output_path, spare, tell, write_file, wrong_usage};
 use crate::bake::{BakeError, Method, Progress, Settings, bake_keeping, update};
 use crate::gather::{self, Hits};
 use crate::import;
@@ -37,10 +37,10 @@ pub struct Arguments {
     #[arg(long, value_name = "LENGTH", value_parser = positive)]
     element: Option<f32>,
     /// Stop when every light has at most this share of its power left to distribute
-    #[arg(long, value_name = "R", default_value_t = Settings::default().residual, value_parser = positive)]
+    #[arg(long, value_name = "R", default_value_t = Settings::default().residual, value_parser = share)]
     residual: f32,
     /// Meet this estimated relative error for every light, with elements and rays that are just enough
-    #[arg(long, value_name = "E", value_parser = positive, conflicts_with_all = ["shots", "plain"])]
+    #[arg(long, value_name = "E", value_parser = share, conflicts_with_all = ["shots", "plain"])]
     error: Option<f32>,
     /// Stop after so many distinct rows and passes of 16 rays (plain shots with --plain)
     #[arg(long, value_name = "N")]
@@ -74,6 +74,14 @@ enum MethodName {
     Gather,
     Rows,
     Device,
+}
+
+/// A share of a whole.
+fn share(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(value) if value > 0.0 && value < 1.0 => Ok(value),
+        _ => Err("it must be a number between 0 and 1".to_owned()),
+    }
 }
 
 fn positive(text: &str) -> Result<f32, String> {
@@ -114,6 +122,14 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     let inputs = [&arguments.lights, &arguments.update, &arguments.rows];
     for input in inputs.into_iter().flatten() {
         keep(input, &output);
+    }
+    spare(&output, &solution::MAGIC);
+    if let Some(rows) = &arguments.keep_rows {
+        keep(&arguments.scene, rows);
+        spare(rows, &gather::MAGIC);
+        if *rows == output {
+            wrong_usage("--keep-rows and -o name the same file: give them two");
+        }
     }
     let imported = import::load(&arguments.scene, arguments.lights.as_deref())?;
     for line in imported.repairs.lines() {
@@ -183,7 +199,7 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     Ok(Outcome {
         interrupted: baked.interrupted,
         report: json!({
-            "file": output,
+            "file": output.display().to_string(),
             "bytes": bytes.len(),
             "surfaces": solution.surfaces.len(),
             "faces": solution.mesh.faces.len(),

@@ -73,7 +73,7 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     Ok(Outcome::done(if is_stdout {
         answered
     } else {
-        json!({"file": arguments.output, "cases": cases.len()})
+        json!({"file": arguments.output.display().to_string(), "cases": cases.len()})
     }))
 }
 

@@ -156,6 +156,25 @@ fn keep(input: &Path, output: &Path) {
     }
 }
 
+/// Ends the program with exit 1 when there is a file at `output` that does not start with `magic`: a
+/// material library or a buffer beside the scene, or anything else that nobody wants to lose.
+fn spare(output: &Path, magic: &[u8]) {
+    use std::io::Read as _;
+    let mut start = Vec::new();
+    let file = std::fs::File::open(output).and_then(|file| {
+        let is_file = file.metadata()?.is_file();
+        file.take(magic.len() as u64).read_to_end(&mut start)?;
+        Ok(is_file)
+    });
+    if file.is_ok_and(|is_file| is_file) && !start.is_empty() && start != magic {
+        tell!(
+            "relume: {}: this file holds something else, which would be overwritten; give another name",
+            output.display()
+        );
+        std::process::exit(1);
+    }
+}
+
 fn wrong_usage(message: &str) -> ! {
     clap::Error::raw(
         clap::error::ErrorKind::ArgumentConflict,

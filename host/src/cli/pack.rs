@@ -9,7 +9,7 @@ use relume::code::Code;
 use serde_json::json;
 
 use super::load::{Loaded, load};
-use super::{Outcome, human_bytes, output_path, tell, write_file};
+use super::{Outcome, human_bytes, output_path, spare, tell, write_file};
 use crate::pack::{Format, pack_measured};
 
 #[derive(Debug, Args)]
@@ -47,6 +47,7 @@ fn code(name: &str) -> Result<Code, String> {
 pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     let path = arguments.input.display().to_string();
     let output = output_path(arguments.output.as_deref(), &arguments.input, "atlas", json);
+    spare(&output, &relume::atlas::MAGIC);
     let Loaded::Solution(solution) = load(&arguments.input)? else {
         bail!("{path}: this is an atlas already; give the solution that it was packed from");
     };
@@ -73,7 +74,7 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
         error.codes_shown,
     );
     Ok(Outcome::done(json!({
-        "file": output,
+        "file": output.display().to_string(),
         "code": format.code.name(),
         "bytes": bytes.len(),
         "code_bytes": atlas.all_codes().len(),

@@ -22,7 +22,7 @@ pub struct Arguments {
     #[arg(long)]
     direct: bool,
     /// Evaluate direct light exactly at the points and gather the indirect there: better than the mesh
-    #[arg(long, requires = "points")]
+    #[arg(long, requires = "points", conflicts_with = "elements")]
     gather: bool,
     /// Where the CSV goes; `-` is stdout
     #[arg(short, long, value_name = "OUT.csv", default_value = "-")]
@@ -89,7 +89,7 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     }
     write_file(&output, &probed.csv)?;
     Ok(Outcome::done(json!({
-        "file": output,
+        "file": output.display().to_string(),
         "lights": solution.lights.len(),
         "missing": probed.missing,
     })))

@@ -158,7 +158,7 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     let exposed = exposure.map_or("linear, unexposed".to_owned(), |e| format!("exposure {e}"));
     tell!("{}: {width}x{height}, {exposed}", output.display());
     Ok(Outcome::done(json!({
-        "file": output,
+        "file": output.display().to_string(),
         "width": width,
         "height": height,
         "exposure": exposure,

@@ -10,7 +10,8 @@ use thiserror::Error;
 
 use super::{Hits, NOTHING, RAYS_PER_PASS};
 
-const MAGIC: [u8; 8] = *b"RELUMERO";
+/// How a rows file starts.
+pub const MAGIC: [u8; 8] = *b"RELUMERO";
 const VERSION: u32 = 1;
 const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 

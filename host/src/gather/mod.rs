@@ -25,7 +25,7 @@ use crate::bvh::{Bvh, Caster, lifted};
 use crate::mesh::Locator;
 use crate::noise;
 
-pub use file::{RowsError, read, write};
+pub use file::{MAGIC, RowsError, read, write};
 
 /// A ray that ends in no element.
 const NOTHING: u32 = u32::MAX;
