@@ -18,6 +18,11 @@ pub trait Visibility {
     /// True when no surface crosses the open segment between the two points.
     fn sees(&self, from: Vec3, to: Vec3) -> bool;
 
+    /// False when nothing is known that could stand between anything.
+    fn may_block(&self) -> bool {
+        true
+    }
+
     /// Visits every surface that [`Shaft::admits`], in the order of their numbers.
     fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(&'v Polygon));
 }

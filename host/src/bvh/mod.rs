@@ -201,6 +201,10 @@ impl Visibility for Narrowed<'_> {
         self.bvh.sees(from, to)
     }
 
+    fn may_block(&self) -> bool {
+        !self.blockers.is_empty()
+    }
+
     fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(&'v Polygon)) {
         let blockers = self.blockers.iter().copied();
         blockers

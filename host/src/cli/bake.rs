@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use glam::Vec3;
 use indicatif::{ProgressBar, ProgressStyle};
 use relume::color::Rgb;
 use serde_json::json;
@@ -15,10 +16,15 @@ use super::{Outcome, human_bytes, keep, output_path, spare, tell, write_file, wr
 use crate::bake::{BakeError, Method, Progress, Settings, bake_keeping, update};
 use crate::gather::{self, Hits};
 use crate::import;
+use crate::scene::OwnedScene;
 use crate::solution::{self, Solution};
 
 /// Most names in a line for people; `--json` has them all.
 const MOST_NAMES: usize = 8;
+
+/// Rounding of coordinates, in diagonals of the scene, that is told: details of a hundredth are a
+/// hundredth off.
+const COARSE_STEP: f32 = 1e-4;
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -136,6 +142,13 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
         tell!("{path}: {line}");
     }
 
+    if let Some(step) = coordinate_step(&imported.scene).filter(|step| *step > COARSE_STEP) {
+        tell!(
+            "{path}: it lies so far from the origin that coordinates round to {:.1e} of its size; move it \
+             there in the program that made it",
+            step
+        );
+    }
     let mut pool = rayon::ThreadPoolBuilder::new();
     if let Some(threads) = arguments.threads {
         pool = pool.num_threads(threads.into());
@@ -219,6 +232,15 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
             "repairs": imported.repairs.lines(),
         }),
     })
+}
+
+/// By how much the farthest coordinate rounds, in diagonals of the scene; `None` for an empty one.
+fn coordinate_step(scene: &OwnedScene) -> Option<f32> {
+    let vertices = || scene.surfaces.iter().flat_map(|s| s.polygon().vertices());
+    let low = vertices().copied().reduce(Vec3::min)?;
+    let high = vertices().copied().reduce(Vec3::max)?;
+    let farthest = low.abs().max(high.abs()).max_element();
+    Some(farthest * f32::EPSILON / (high - low).length())
 }
 
 /// The solution to be updated, and the rows that belong to it.

@@ -9,7 +9,7 @@ use core::f32::consts::PI;
 
 use glam::Vec3;
 
-use crate::geometry::{Clipped, clip};
+use crate::geometry::{Clipped, MAX_VERTICES, clip};
 use crate::math;
 
 /// Squared tangent below which an angle is summed as a series: the fifth term is 3e-7 of the first.
@@ -20,7 +20,22 @@ const SMALL: f32 = 0.04;
 /// In [0, 1]; 0 for a point behind the polygon or in its plane.
 #[must_use]
 pub fn point_to_polygon(point: Vec3, normal: Vec3, outline: &[Vec3]) -> f32 {
-    lambert(normal, &above_horizon(point, normal, outline)).clamp(0.0, 1.0)
+    open_factor(point, normal, outline).clamp(0.0, 1.0)
+}
+
+/// Lambert's sum for what is above the horizon; above zero for a front, but for rounding.
+pub(super) fn open_factor(point: Vec3, normal: Vec3, outline: &[Vec3]) -> f32 {
+    // Most outlines are above the horizon as they are.
+    let mut relative = [Vec3::ZERO; MAX_VERTICES];
+    let mut is_above = outline.len() <= MAX_VERTICES;
+    for (relative, vertex) in relative.iter_mut().zip(outline) {
+        *relative = *vertex - point;
+        is_above &= relative.dot(normal) >= 0.0;
+    }
+    match relative.get(..outline.len()) {
+        Some(outline) if is_above => lambert(normal, outline),
+        _ => lambert(normal, &above_horizon(point, normal, outline)),
+    }
 }
 
 /// The outline relative to `point`, without what lies below the horizon.

@@ -25,7 +25,7 @@ use crate::visibility::{Shaft, Visibility};
 
 pub use lambert::point_to_polygon;
 
-use lambert::{above_horizon, lambert};
+use lambert::{above_horizon, lambert, open_factor};
 use visible::visible_factor;
 
 /// Most surfaces that may stand between one receiver and one shooter to be cut out exactly.
@@ -80,7 +80,7 @@ impl Shooter {
         if self.is_out_of_sight(receiver) {
             return 0.0;
         }
-        let blockers = blockers(&Shaft::new(receiver, &self.polygon), visibility);
+        let blockers = blockers(|| Shaft::new(receiver, &self.polygon), visibility);
         let blockers = blockers.as_deref();
         let points = gauss_points(receiver);
         let factors = points.iter().zip(&self.samples).map(|(point, samples)| {
@@ -120,10 +120,9 @@ impl Shooter {
         if height <= tolerance {
             return Some(0.0);
         }
-        let shaft = Shaft::from_point(point, normal, &self.polygon);
-        let blockers = blockers(&shaft, visibility)?;
-        let view = View::new(point, normal, &self.polygon);
-        let factor = view.exact(&self.polygon, &blockers)?;
+        let shaft = || Shaft::from_point(point, normal, &self.polygon);
+        let blockers = blockers(shaft, visibility)?;
+        let factor = self.exact(point, normal, &blockers)?;
         Some(factor.clamp(0.0, 1.0))
     }
 
@@ -152,21 +151,36 @@ impl Shooter {
         if height <= tolerance {
             return 0.0;
         }
-        let view = View::new(point, normal, &self.polygon);
-        let exact = blockers.and_then(|blockers| view.exact(&self.polygon, blockers));
+        let exact = blockers.and_then(|blockers| self.exact(point, normal, blockers));
         exact
-            .unwrap_or_else(|| self.sampled(&view, samples, visibility))
+            .unwrap_or_else(|| self.sampled(point, normal, samples, visibility))
             .max(0.0)
     }
 
+    /// The factor of what is visible; `None` when the blockers are too many to be cut out.
+    fn exact(&self, point: Vec3, normal: Vec3, blockers: &[&Polygon]) -> Option<f32> {
+        if blockers.is_empty() {
+            return Some(open_factor(point, normal, self.polygon.vertices()));
+        }
+        let outline = above_horizon(point, normal, self.polygon.vertices());
+        visible_factor(point, normal, &self.polygon, outline, blockers)
+    }
+
     /// Lambert's factor times the visible share of the kernel at some points of the patch.
-    fn sampled(&self, view: &View, samples: &[SamplePoint], visibility: &impl Visibility) -> f32 {
-        let open = lambert(view.normal, &view.outline);
+    fn sampled(
+        &self,
+        point: Vec3,
+        normal: Vec3,
+        samples: &[SamplePoint],
+        visibility: &impl Visibility,
+    ) -> f32 {
+        let above = above_horizon(point, normal, self.polygon.vertices());
+        let open = lambert(normal, &above);
         if open <= 0.0 {
             return 0.0;
         }
-        let visible = self.visible_share(view.point, view.normal, samples, visibility);
-        open * visible.unwrap_or_else(|| sees_middle(view.point, &view.outline, visibility))
+        let visible = self.visible_share(point, normal, samples, visibility);
+        open * visible.unwrap_or_else(|| sees_middle(point, &above, visibility))
     }
 
     /// Share of the kernel that is not hidden; `None` when every sample is below the horizon.
@@ -195,37 +209,6 @@ impl Shooter {
     }
 }
 
-/// A receiver point and what of the patch is above its horizon, relative to it.
-struct View {
-    point: Vec3,
-    normal: Vec3,
-    outline: Clipped,
-}
-
-impl View {
-    fn new(point: Vec3, normal: Vec3, polygon: &Polygon) -> Self {
-        Self {
-            point,
-            normal,
-            outline: above_horizon(point, normal, polygon.vertices()),
-        }
-    }
-
-    /// The factor of what is visible; `None` when the blockers are too many to be cut out.
-    fn exact(&self, polygon: &Polygon, blockers: &[&Polygon]) -> Option<f32> {
-        if blockers.is_empty() {
-            return Some(lambert(self.normal, &self.outline));
-        }
-        visible_factor(
-            self.point,
-            self.normal,
-            polygon,
-            self.outline.clone(),
-            blockers,
-        )
-    }
-}
-
 /// 1 when the middle of what is above the horizon is visible, else 0.
 fn sees_middle(point: Vec3, above: &Clipped, visibility: &impl Visibility) -> f32 {
     let middle = above.iter().copied().sum::<Vec3>() / above.len().max(1) as f32;
@@ -234,12 +217,16 @@ fn sees_middle(point: Vec3, above: &Clipped, visibility: &impl Visibility) -> f3
 
 /// All that a shaft admits; `None` when it is too much to be cut out.
 fn blockers<'v>(
-    shaft: &Shaft,
+    shaft: impl FnOnce() -> Shaft,
     visibility: &'v impl Visibility,
 ) -> Option<Vec<&'v Polygon, BLOCKERS>> {
     let mut blockers = Vec::new();
     let mut fits = true;
-    visibility.between(shaft, &mut |blocker| fits &= blockers.push(blocker).is_ok());
+    if visibility.may_block() {
+        visibility.between(&shaft(), &mut |blocker| {
+            fits &= blockers.push(blocker).is_ok();
+        });
+    }
     fits.then_some(blockers)
 }
 
