@@ -922,7 +922,7 @@ fn wrong_scenes_are_one_line_and_exit_1() {
     let needs = r#"{"asset": {"version": "2.0"}, "extensionsRequired": ["EXT_no_such"]}"#;
     folder.write("needs.gltf", needs);
     fs::create_dir(folder.path().join("folder.obj")).unwrap();
-    folder.write("out.solution", "as it was");
+    folder.write("out.solution", "RELUMESO as it was");
     for (scene, expected) in [
         ("missing.obj", "missing.obj: cannot be read: "),
         ("missing.glb", "missing.glb: cannot be read: "),
