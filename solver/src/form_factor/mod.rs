@@ -216,10 +216,10 @@ fn sees_middle(point: Vec3, above: &Clipped, visibility: &impl Visibility) -> f3
 }
 
 /// All that a shaft admits; `None` when it is too much to be cut out.
-fn blockers<'v>(
+fn blockers(
     shaft: impl FnOnce() -> Shaft,
-    visibility: &'v impl Visibility,
-) -> Option<Vec<&'v Polygon, BLOCKERS>> {
+    visibility: &impl Visibility,
+) -> Option<Vec<&Polygon, BLOCKERS>> {
     let mut blockers = Vec::new();
     let mut fits = true;
     if visibility.may_block() {
