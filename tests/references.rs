@@ -5,56 +5,20 @@ mod bake;
 
 use bake::{baked, exact, room};
 use glam::DVec3;
-use relume::form_factor;
 use relume_host::builtin::{Builtin, cornell_box};
 use relume_host::bvh::Bvh;
-use relume_host::reference::dense::{DenseLight, DenseSolution, DenseSystem};
+use relume_host::reference::dense::DenseSolution;
 use relume_host::reference::path_trace::{Estimate, PathTracer, Receiver};
+use relume_host::rows::Parallel;
 use relume_host::solution::Solution;
+use relume_host::study::system::System;
 
 /// The dense `f64` solution of the same mesh and form factors; area lights only.
 fn dense(builtin: &Builtin, solution: &Solution) -> DenseSolution {
-    let mesh = solution.mesh.view();
-    let (n, p) = (mesh.elements.len(), mesh.patches.len());
     let bvh = Bvh::for_scene(&builtin.scene.view().expect("legal"));
-    let mut form_factors = vec![0.0_f32; n * p];
-    for (row, patch) in form_factors.chunks_mut(n).zip(0..) {
-        form_factor::row(&mesh, patch, &bvh, row);
-    }
-    let exitance: Vec<Vec<[f64; 3]>> = (0..solution.lights.len() as u32)
-        .map(|light| {
-            let of_patch = |patch: u32| {
-                let emission = mesh.patch_emission(patch).filter(|e| e.light == light);
-                emission.map_or([0.0; 3], |e| e.share.to_array().map(f64::from))
-            };
-            (0..p as u32).map(of_patch).collect()
-        })
-        .collect();
-    let nothing = vec![[0.0; 3]; n];
-    let lights: Vec<DenseLight> = exitance
-        .iter()
-        .map(|exitance| DenseLight {
-            exitance,
-            direct: &nothing,
-        })
-        .collect();
-    let patch_areas: Vec<f64> = mesh.patches.iter().map(|p| p.area.into()).collect();
-    let element_areas: Vec<f64> = mesh.elements.iter().map(|e| e.area.into()).collect();
-    let reflectances: Vec<[f64; 3]> = mesh
-        .elements
-        .iter()
-        .map(|e| e.reflectance.to_array().map(f64::from))
-        .collect();
-    let patch_of: Vec<u32> = mesh.elements.iter().map(|e| e.patch).collect();
-    let system = DenseSystem {
-        form_factors: &form_factors,
-        patch_areas: &patch_areas,
-        element_areas: &element_areas,
-        reflectances: &reflectances,
-        patch_of: &patch_of,
-        lights: &lights,
-    };
-    system.solve().expect("a regular system")
+    let rows = Parallel::new(&solution.mesh.view(), &bvh);
+    let system = System::new(solution.mesh.clone(), solution.lights.len() as u32, &rows);
+    system.dense().expect("a regular system")
 }
 
 #[test]

@@ -7,7 +7,7 @@ use super::direct::{self, DirectRow, DirectSource, Lamps};
 use super::{BakeError, Job, LANES, Settings, Solved};
 use crate::bvh::Bvh;
 use crate::gather::{Hits, RAYS_PER_PASS, Rays};
-use crate::mesh::OwnedMesh;
+use crate::mesh::{Locator, OwnedMesh};
 use crate::rows::Parallel;
 
 /// Most passes: 64 * 16 rays for every element.
@@ -50,7 +50,8 @@ pub(super) fn gather(
         },
     )?;
     light.bounce(&mesh, &Hits::default(), job.settings.residual);
-    let rays = Rays::new(view, bvh);
+    let locator = Locator::new(view);
+    let rays = Rays::new(view, &locator, bvh);
     let mut hits = Hits::default();
     let mut next_look = FIRST_LOOK;
     while lamps.is_complete && (hits.passes() as u32) < passes {

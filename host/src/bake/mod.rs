@@ -8,6 +8,7 @@ mod accuracy;
 mod bounce;
 mod direct;
 mod estimate;
+mod memory;
 mod shoot;
 mod update;
 
@@ -28,6 +29,7 @@ use crate::scene::OwnedScene;
 use crate::solution::{Solution, SolutionLight};
 
 pub use crate::solution::Method;
+pub use memory::Memory;
 pub use update::update;
 
 /// Lanes of a block of lights on the host.

@@ -2,10 +2,10 @@
 
 use relume::color::Rgb;
 use relume::mesh::Mesh;
-use relume::refine::{Block, Choice, PatchState, Refinement, RowStorage, Storage};
+use relume::refine::{Choice, Refinement};
 
 use super::direct::{self, DirectSource, Lamps};
-use super::{BakeError, Job, LANES, Settings, Solved};
+use super::{BakeError, Job, LANES, Memory, Settings, Solved};
 use crate::mesh::{Direct, OwnedMesh, Split, split};
 use crate::rows::RowFiller;
 
@@ -72,7 +72,13 @@ pub(super) fn refine<F: RowFiller>(
         Split { mesh, first, .. } = split(&mesh, direct, settings.variation, budget);
     }
 
-    let mut memory = Memory::new(&mesh, lights, settings);
+    let (n, p) = (mesh.elements.len(), mesh.patches.len());
+    let rows = if settings.plain {
+        0
+    } else {
+        p.min(ROW_BYTES / (4 * n + 12 * p).max(1))
+    };
+    let mut memory = Memory::new(&mesh.view(), lights, rows, settings.split_direct);
     let storage = memory.storage();
     let goal = settings.residual;
     let tags = job.scene.lights();
@@ -116,63 +122,6 @@ fn add_direct(irradiance: &mut [f32], lights: usize, direct: &direct::DirectRow)
     let values = irradiance.iter_mut().skip(direct.light as usize);
     for (value, factor) in values.step_by(lights).zip(direct.row) {
         *value += share * factor;
-    }
-}
-
-/// The memory that a refinement borrows.
-struct Memory {
-    irradiance: Vec<[[f32; LANES]; 3]>,
-    direct: Vec<[[f32; LANES]; 3]>,
-    unshot: Vec<[[f32; LANES]; 3]>,
-    patches: Vec<PatchState>,
-    blocks: Vec<Block<LANES>>,
-    factors: Vec<f32>,
-    shares: Vec<Rgb>,
-    sources: Vec<[[f32; LANES]; 3]>,
-    sent: Vec<[[f32; LANES]; 3]>,
-    work: Vec<[[f32; LANES]; 3]>,
-}
-
-impl Memory {
-    fn new(mesh: &OwnedMesh, lights: usize, settings: &Settings) -> Self {
-        let blocks = lights.div_ceil(LANES);
-        let (n, p) = (mesh.elements.len(), mesh.patches.len());
-        let zero = [[0.0; LANES]; 3];
-        let rows = if settings.plain {
-            0
-        } else {
-            p.min(ROW_BYTES / (4 * n + 12 * p).max(1))
-        };
-        let known = if rows > 0 { p } else { 0 };
-        Self {
-            irradiance: vec![zero; n * blocks],
-            direct: vec![zero; if settings.split_direct { n * blocks } else { 0 }],
-            unshot: vec![zero; p * blocks],
-            patches: vec![PatchState::EMPTY; p],
-            blocks: vec![Block::EMPTY; blocks],
-            factors: vec![0.0; rows * n],
-            shares: vec![Rgb::BLACK; rows * p],
-            sources: vec![zero; known * blocks],
-            sent: vec![zero; known * blocks],
-            work: vec![zero; 6 * known],
-        }
-    }
-
-    fn storage(&mut self) -> Storage<'_, LANES> {
-        Storage {
-            irradiance: &mut self.irradiance,
-            direct: &mut self.direct,
-            unshot: &mut self.unshot,
-            patches: &mut self.patches,
-            blocks: &mut self.blocks,
-            rows: RowStorage {
-                factors: &mut self.factors,
-                shares: &mut self.shares,
-                sources: &mut self.sources,
-                sent: &mut self.sent,
-                work: &mut self.work,
-            },
-        }
     }
 }
 

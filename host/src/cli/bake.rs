@@ -7,7 +7,6 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use glam::Vec3;
 use indicatif::{ProgressBar, ProgressStyle};
 use relume::color::Rgb;
 use serde_json::json;
@@ -236,11 +235,9 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
 
 /// By how much the farthest coordinate rounds, in diagonals of the scene; `None` for an empty one.
 fn coordinate_step(scene: &OwnedScene) -> Option<f32> {
-    let vertices = || scene.surfaces.iter().flat_map(|s| s.polygon().vertices());
-    let low = vertices().copied().reduce(Vec3::min)?;
-    let high = vertices().copied().reduce(Vec3::max)?;
-    let farthest = low.abs().max(high.abs()).max_element();
-    Some(farthest * f32::EPSILON / (high - low).length())
+    let vertices = scene.surfaces.iter().flat_map(|s| s.polygon().vertices());
+    let farthest = vertices.map(|v| v.abs().max_element()).fold(0.0, f32::max);
+    Some(farthest * f32::EPSILON / scene.view().ok()?.diagonal())
 }
 
 /// The solution to be updated, and the rows that belong to it.

@@ -21,7 +21,7 @@ use crate::builtin::{Builtin, cornell_box};
 use crate::display_error::max_codes;
 use crate::export::exr;
 use crate::mix::{Setting, mix};
-use crate::pack::{Format, PackingError, pack, packing_error, relight_atlas};
+use crate::pack::{Format, PackingError, pack_measured, relight_atlas};
 use crate::picture::{self, Exposure, LinearImage, Tile, error_map, sheet};
 use crate::preview::{Camera, Relit, Viewpoint, render, show};
 use crate::solution::{self, Solution};
@@ -165,10 +165,9 @@ fn make(folder: &mut Folder) -> Result<serde_json::Value> {
         quantity: Quantity::Irradiance,
         mesh: true,
     };
-    let atlas_bytes = pack(solution, format)?;
+    let (atlas_bytes, mut error) = pack_measured(solution, format)?;
     let solution_bytes = solution::write(solution);
     let atlas = Atlas::parse(&atlas_bytes)?;
-    let mut error = packing_error(solution, &atlas)?;
 
     fs::create_dir_all(FOLDER).with_context(|| format!("{FOLDER}: cannot be made"))?;
     folder.write("cornell.solution", &solution_bytes)?;

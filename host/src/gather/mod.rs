@@ -52,7 +52,7 @@ pub struct End {
 pub struct Rays<'a> {
     mesh: Mesh<'a>,
     bvh: &'a Bvh,
-    locator: Locator<'a>,
+    locator: &'a Locator<'a>,
 }
 
 /// A point of the sequence without its shift: the same for every element.
@@ -83,14 +83,10 @@ impl Step {
 }
 
 impl<'a> Rays<'a> {
-    /// Rays through a mesh and the surfaces that it was made of.
+    /// Rays through a mesh, its elements by place, and the surfaces that it was made of.
     #[must_use]
-    pub fn new(mesh: Mesh<'a>, bvh: &'a Bvh) -> Self {
-        Self {
-            mesh,
-            bvh,
-            locator: Locator::new(mesh),
-        }
+    pub const fn new(mesh: Mesh<'a>, locator: &'a Locator<'a>, bvh: &'a Bvh) -> Self {
+        Self { mesh, bvh, locator }
     }
 
     /// Where `count` cosine-weighted rays from a point of a polygon end, on the side of its front; the

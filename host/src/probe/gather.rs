@@ -22,6 +22,7 @@ use relume::visibility::Visibility;
 use super::Part;
 use crate::bvh::Bvh;
 use crate::gather::Rays;
+use crate::mesh::Locator;
 use crate::noise;
 use crate::rows::{Parallel, RowFiller, quarters};
 use crate::solution::Solution;
@@ -62,6 +63,7 @@ pub(super) struct Spot {
 /// A solution, ready to be gathered from.
 pub(super) struct Gatherer<'a> {
     solution: &'a Solution,
+    locator: Locator<'a>,
     bvh: Bvh,
     lamps: Vec<(Shooter, Emission)>,
     /// Direct irradiance of the elements, light inside.
@@ -84,6 +86,7 @@ impl<'a> Gatherer<'a> {
         let bvh = Bvh::new(&surfaces, farthest);
         Self {
             solution,
+            locator: Locator::new(solution.mesh.view()),
             direct: direct_of_elements(solution, &bvh, far),
             patches: radiant_patches(solution),
             bvh,
@@ -170,7 +173,7 @@ impl<'a> Gatherer<'a> {
 
     fn add_near(&self, spot: Spot, seed: u64, values: &mut [Rgb]) {
         let mesh = self.solution.mesh.view();
-        let rays = Rays::new(mesh, &self.bvh);
+        let rays = Rays::new(mesh, &self.locator, &self.bvh);
         let ends = rays.from_point(&spot.outline, spot.position, seed, RAYS);
         for (end, number) in ends.zip(seed * u64::from(RAYS)..) {
             let Some((end, element)) = end.and_then(|end| {

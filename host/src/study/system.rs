@@ -5,10 +5,9 @@
 
 use relume::color::Rgb;
 use relume::mesh::Mesh;
-use relume::refine::{
-    Block, Choice, Lanes, PatchState, RefineError, Refinement, RowStorage, Storage,
-};
+use relume::refine::{Choice, RefineError, Refinement};
 
+use crate::bake::Memory;
 use crate::mesh::OwnedMesh;
 use crate::reference::dense::{DenseError, DenseLight, DenseSolution, DenseSystem};
 use crate::rows::RowFiller;
@@ -169,7 +168,7 @@ impl System {
         } else {
             0
         };
-        let mut memory = Memory::<LANES>::new(&mesh, self.lights, rows);
+        let mut memory = Memory::<LANES>::new(&mesh, self.lights as usize, rows, false);
         let mut refinement = Refinement::new(mesh, self.lights, way.residual, memory.storage())?;
         refinement.set_choice(way.choice);
         let mut shooters = Vec::new();
@@ -234,59 +233,4 @@ pub fn exitance(mesh: &Mesh, patch: u32, light: u32) -> [f64; 3] {
 
 fn rgb(value: Rgb) -> [f64; 3] {
     value.to_array().map(f64::from)
-}
-
-/// Memory of a refinement, for blocks of any width.
-#[derive(Debug)]
-pub struct Memory<const K: usize> {
-    irradiance: Vec<Lanes<K>>,
-    unshot: Vec<Lanes<K>>,
-    patches: Vec<PatchState>,
-    blocks: Vec<Block<K>>,
-    factors: Vec<f32>,
-    shares: Vec<Rgb>,
-    sources: Vec<Lanes<K>>,
-    sent: Vec<Lanes<K>>,
-    work: Vec<Lanes<K>>,
-}
-
-impl<const K: usize> Memory<K> {
-    /// Room for `lights` tags, and to keep `rows` rows.
-    #[must_use]
-    pub fn new(mesh: &Mesh, lights: u32, rows: usize) -> Self {
-        let blocks = (lights as usize).div_ceil(K);
-        let (n, p) = (mesh.elements.len(), mesh.patches.len());
-        let zero = [[0.0; K]; 3];
-        let known = if rows > 0 { p } else { 0 };
-        Self {
-            irradiance: vec![zero; n * blocks],
-            unshot: vec![zero; p * blocks],
-            patches: vec![PatchState::EMPTY; p],
-            blocks: vec![Block::EMPTY; blocks],
-            factors: vec![0.0; rows * n],
-            shares: vec![Rgb::BLACK; rows * p],
-            sources: vec![zero; known * blocks],
-            sent: vec![zero; known * blocks],
-            work: vec![zero; 6 * known],
-        }
-    }
-
-    /// The memory as the refinement borrows it.
-    #[must_use]
-    pub fn storage(&mut self) -> Storage<'_, K> {
-        Storage {
-            irradiance: &mut self.irradiance,
-            direct: &mut [],
-            unshot: &mut self.unshot,
-            patches: &mut self.patches,
-            blocks: &mut self.blocks,
-            rows: RowStorage {
-                factors: &mut self.factors,
-                shares: &mut self.shares,
-                sources: &mut self.sources,
-                sent: &mut self.sent,
-                work: &mut self.work,
-            },
-        }
-    }
 }

@@ -10,10 +10,11 @@ use relume::refine::Refinement;
 
 use super::clock::{median, tried};
 use super::rooms::{Room, SPACING, only, room};
+use crate::bake::Memory;
 use crate::bake::{Method, Settings, bake};
 use crate::rows::{Parallel, RowFiller as _};
 use crate::study::stability::with_reflectance;
-use crate::study::system::{Field, LANES, Memory, Refined, System, Way};
+use crate::study::system::{Field, LANES, Refined, System, Way};
 
 /// Residual that rows end at if their number does not.
 const RESIDUAL: f32 = 1e-6;
@@ -98,7 +99,7 @@ fn rows_needed(room: &Room) -> Result<u32> {
 pub(super) fn solve<const K: usize>(room: &Room, rows: u32) -> Result<()> {
     let mesh = room.mesh.view();
     let filler = Parallel::new(&mesh, &room.bvh);
-    let mut memory = Memory::<K>::new(&mesh, room.lights(), mesh.patches.len());
+    let mut memory = Memory::<K>::new(&mesh, room.lights() as usize, mesh.patches.len(), false);
     let mut refinement = Refinement::new(mesh, room.lights(), RESIDUAL, memory.storage())?;
     let mut row = vec![0.0; mesh.elements.len()];
     for _ in 0..rows {

@@ -7,8 +7,8 @@ use anyhow::Result;
 use relume::refine::{Choice, Refinement};
 
 use super::rooms::Room;
+use crate::bake::Memory;
 use crate::rows::RowFiller;
-use crate::study::system::Memory;
 
 /// One repeat of a solve.
 #[derive(Clone, Debug, Default)]
@@ -28,7 +28,7 @@ pub fn published<const K: usize>(
     shots: u32,
 ) -> Result<Shots> {
     let mesh = room.mesh.view();
-    let mut memory = Memory::<K>::new(&mesh, room.lights(), 0);
+    let mut memory = Memory::<K>::new(&mesh, room.lights() as usize, 0, false);
     let mut refinement = Refinement::new(mesh, room.lights(), 1e-9, memory.storage())?;
     refinement.set_choice(Choice::Power);
     let mut row = vec![0.0; mesh.elements.len()];
