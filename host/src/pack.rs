@@ -183,6 +183,7 @@ pub fn unpack(atlas: &Atlas) -> Solution {
         })
         .collect();
     let (surfaces, mesh) = unpack_mesh(atlas);
+    let exposed = vec![1.0; mesh.elements.len()];
     Solution {
         surfaces,
         luminaires: Vec::new(),
@@ -198,6 +199,7 @@ pub fn unpack(atlas: &Atlas) -> Solution {
             .collect(),
         contributions,
         direct: None,
+        exposed,
         method: Method::default(),
         rows: 0,
         spacing: Spacing {

@@ -160,6 +160,7 @@ fn read_out(
         direct: settings
             .split_direct
             .then(|| collect(&|element, light| refinement.direct(element, light))),
+        exposed: vec![1.0; mesh.elements.len()],
         residuals: (0..lights).map(|l| refinement.light_residual(l)).collect(),
         errors: (0..lights).map(|l| refinement.light_error(l)).collect(),
         rows: refinement.rows_evaluated(),

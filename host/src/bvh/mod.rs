@@ -20,6 +20,7 @@ use obvhs::{Boundable, BvhBuildParams};
 
 use relume::geometry::Polygon;
 use relume::luminaire;
+use relume::mesh::Side;
 use relume::scene::{Scene, Source, Surface};
 use relume::visibility::{Bounds, Shaft, Visibility};
 
@@ -54,6 +55,14 @@ pub struct Hit {
     pub distance: f32,
     /// True when the front of the surface was met.
     pub front: bool,
+}
+
+impl Hit {
+    /// The side of the surface that was met.
+    #[must_use]
+    pub const fn side(&self) -> Side {
+        if self.front { Side::Front } else { Side::Back }
+    }
 }
 
 /// A polygon's box, widened by the rounding that [`Polygon::crossing`] allows.

@@ -47,7 +47,43 @@ impl<'a> Caster<'a> {
     /// The surface that a ray meets first.
     #[must_use]
     pub fn nearest(&mut self, from: Vec3, direction: Vec3) -> Option<Hit> {
-        self.facets.nearest(from, direction, &mut self.waiting)
+        let ray = Ray::new(from, direction);
+        let met = self.first(&ray, direction, f32::INFINITY, false)?;
+        Some(Hit {
+            surface: met.surface,
+            distance: met.distance,
+            front: met.front,
+        })
+    }
+
+    /// True when no surface stands between two [`lifted`] points.
+    ///
+    /// [`lifted`]: super::lifted
+    #[must_use]
+    pub fn sees(&mut self, from: Vec3, to: Vec3) -> bool {
+        let ray = Ray::new(from, to - from);
+        self.first(&ray, to - from, 1.0, true).is_none()
+    }
+
+    /// What a ray meets first before `farthest`, or, where any will do, what is found first.
+    fn first(&mut self, ray: &Ray, direction: Vec3, farthest: f32, any: bool) -> Option<Met> {
+        let mut met = Met {
+            distance: farthest,
+            surface: u32::MAX,
+            front: false,
+        };
+        let facets = self.facets;
+        if facets.nodes.is_empty() {
+            for block in &facets.blocks {
+                block.meet(ray, &mut met);
+                if any && met.distance < farthest {
+                    break;
+                }
+            }
+        } else {
+            facets.descend(ray, direction, &mut met, any, &mut self.waiting);
+        }
+        (met.distance < farthest).then_some(met)
     }
 }
 
@@ -115,29 +151,17 @@ impl Facets {
         Child::Node(number as u32)
     }
 
-    /// What a ray meets first.
-    fn nearest(&self, from: Vec3, direction: Vec3, waiting: &mut Vec<(f32, Child)>) -> Option<Hit> {
-        let ray = Ray::new(from, direction);
-        let mut met = Met {
-            distance: f32::INFINITY,
-            surface: u32::MAX,
-            front: false,
-        };
-        if self.nodes.is_empty() {
-            for block in &self.blocks {
-                block.meet(&ray, &mut met);
-            }
-        } else {
-            self.descend(&ray, direction, &mut met, waiting);
-        }
-        met.distance.is_finite().then_some(Hit {
-            surface: met.surface,
-            distance: met.distance,
-            front: met.front,
-        })
-    }
-
-    fn descend(&self, ray: &Ray, direction: Vec3, met: &mut Met, waiting: &mut Vec<(f32, Child)>) {
+    /// Puts what a ray meets first, or what is found first where any will do, in place of what is
+    /// farther.
+    fn descend(
+        &self,
+        ray: &Ray,
+        direction: Vec3,
+        met: &mut Met,
+        any: bool,
+        waiting: &mut Vec<(f32, Child)>,
+    ) {
+        let farthest = met.distance;
         let slabs = Slabs::new(ray, direction);
         waiting.clear();
         waiting.push((0.0, Child::Node(0)));
@@ -146,7 +170,12 @@ impl Facets {
                 continue;
             }
             match child {
-                Child::Block(block) => self.blocks[block as usize].meet(ray, met),
+                Child::Block(block) => {
+                    self.blocks[block as usize].meet(ray, met);
+                    if any && met.distance < farthest {
+                        return;
+                    }
+                }
                 Child::Node(node) => {
                     let node = &self.nodes[node as usize];
                     let (near, mut hits) = node.meet(&slabs, met.distance);

@@ -20,7 +20,6 @@ use relume::geometry::{Polygon, from_unit_square, gauss_points};
 use relume::luminaire;
 use relume::mesh::{Face, Mesh, Side, Spacing, is_face, subdivide};
 use relume::scene::{Scene, Source};
-use relume::visibility::Visibility;
 
 use super::{BuildError, OwnedMesh};
 use crate::bvh::{Bvh, Hit, lifted};
@@ -306,7 +305,7 @@ impl<'a> Surroundings<'a> {
         let least = GRAZING * ray.length();
         ray.dot(a.normal) > least
             && ray.dot(b.normal) < -least
-            && self.bvh.sees(a.position, b.position)
+            && self.bvh.caster().sees(a.start, b.start)
     }
 }
 

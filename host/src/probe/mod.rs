@@ -6,6 +6,8 @@
 //! one-sided surface, which reflects nothing; a side of reflectance 0 is not stored and gives no value.
 
 mod gather;
+mod lamp;
+mod radiant;
 
 use std::io;
 
@@ -190,7 +192,11 @@ pub fn probe_points(
     })
 }
 
-/// The same, with direct light evaluated exactly at every point and indirect light gathered there.
+/// Rays that gather light at a point, by default.
+pub const RAYS: u32 = 1024;
+
+/// The same, with direct light evaluated exactly at every point and indirect light gathered there by
+/// so many rays.
 ///
 /// # Errors
 /// [`ProbeError::NoMesh`].
@@ -198,12 +204,13 @@ pub fn probe_gathered(
     solution: &Solution,
     points: &[ProbePoint],
     part: Part,
+    rays: u32,
 ) -> Result<Probed, ProbeError> {
     if solution.mesh.faces.is_empty() {
         return Err(ProbeError::NoMesh);
     }
     let places = Places::new(solution);
-    let gatherer = Gatherer::new(solution);
+    let gatherer = Gatherer::new(solution, rays);
     let values: Vec<Option<Vec<Rgb>>> = points
         .par_iter()
         .enumerate()

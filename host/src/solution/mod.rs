@@ -66,6 +66,9 @@ pub struct Solution {
     pub contributions: Vec<Rgb>,
     /// The direct part of it, where it was kept apart.
     pub direct: Option<Vec<Rgb>>,
+    /// Share of each element that light can reach: what is seen of it is lit by so much more. 1 where
+    /// that was not looked for.
+    pub exposed: Vec<f32>,
     /// How the bounces were found.
     pub method: Method,
     /// Rows that the bake evaluated, and passes of rays.
