@@ -105,7 +105,7 @@ impl Fan {
     #[must_use]
     pub fn new(count: u32) -> Self {
         let step = |index: u32| Step {
-            share: ((u64::from(index) << 32) / u64::from(count)) as u32,
+            share: ((u64::from(2 * index + 1) << 31) / u64::from(count)) as u32,
             turn: Vec2::from_angle(TAU * noise::fraction(index.wrapping_mul(GOLDEN_STEP))),
             ..Step::new(index)
         };
@@ -168,13 +168,12 @@ impl<'a> Rays<'a> {
         seed: u64,
         fan: &'r Fan,
     ) -> impl Iterator<Item = Option<End>> + 'r {
-        let [share, turn] = [0, 1].map(|axis| noise::bits(seed * 2 + axis));
-        let first = Vec2::from_angle(TAU * noise::fraction(turn));
+        let first = Vec2::from_angle(TAU * noise::unit(seed));
         let frame = Frame::new(polygon);
         let from = lifted(polygon, point);
         let mut caster = self.bvh.caster();
         fan.0.iter().map(move |step| {
-            let direction = frame.direction(step.across(share, first));
+            let direction = frame.direction(step.across(0, first));
             self.end(&mut caster, from, direction)
         })
     }

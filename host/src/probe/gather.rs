@@ -9,7 +9,7 @@
 //! matters (final gather; Reichert 1992). What counts of `h` is the light on the part of it that light
 //! can reach. Where a ray ends within a few elements even the edge of a shadow matters: there the
 //! direct part of `E_h` is that of the place itself, by one shadow ray to each lamp; and where it ends
-//! within half an element, as in corners, the ray goes on for the indirect part, too (Christensen
+//! within a quarter of an element, as in corners, the ray goes on for the indirect part, too (Christensen
 //! 1999, secondary final gathering). Assumption: lamps radiate evenly from their front.
 
 use std::borrow::Cow;
@@ -35,7 +35,7 @@ use crate::solution::Solution;
 const NEAR: f32 = 2.0;
 
 /// Rays that are shorter than so many edges go on.
-const SHORT: f32 = 0.5;
+const SHORT: f32 = 0.25;
 
 /// Parts of a ray at most: many in a narrow gap.
 const MOST_STEPS: u64 = 16;
