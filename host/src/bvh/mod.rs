@@ -24,7 +24,7 @@ use relume::mesh::Side;
 use relume::scene::{Scene, Source, Surface};
 use relume::visibility::{Bounds, Shaft, Visibility};
 
-pub use nearest::Caster;
+pub use nearest::{Caster, PointCaster};
 use nearest::Facets;
 
 /// Surfaces in a tree of boxes.
@@ -133,6 +133,12 @@ impl Bvh {
     #[must_use]
     pub const fn caster(&self) -> Caster<'_> {
         Caster::new(&self.facets)
+    }
+
+    /// The same from one [`lifted`] point.
+    #[must_use]
+    pub fn caster_from(&self, point: Vec3) -> PointCaster<'_> {
+        PointCaster::new(&self.facets, point)
     }
 
     fn crossing(&self, index: usize, from: Vec3, to: Vec3) -> Option<f32> {

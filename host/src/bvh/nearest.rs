@@ -15,7 +15,7 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use relume::scene::Surface;
 
-use super::facet::{Block, Facet, LANES, Met, Ray};
+use super::facet::{Block, Facet, LANES, Met, Ray, Start};
 use super::{Bounded, Hit};
 
 /// Most blocks that are asked one after the other: 32 facets.
@@ -48,12 +48,7 @@ impl<'a> Caster<'a> {
     #[must_use]
     pub fn nearest(&mut self, from: Vec3, direction: Vec3) -> Option<Hit> {
         let ray = Ray::new(from, direction);
-        let met = self.first(&ray, direction, f32::INFINITY, false)?;
-        Some(Hit {
-            surface: met.surface,
-            distance: met.distance,
-            front: met.front,
-        })
+        self.first(&ray, direction, f32::INFINITY, false)
     }
 
     /// True when no surface stands between two [`lifted`] points.
@@ -66,12 +61,8 @@ impl<'a> Caster<'a> {
     }
 
     /// What a ray meets first before `farthest`, or, where any will do, what is found first.
-    fn first(&mut self, ray: &Ray, direction: Vec3, farthest: f32, any: bool) -> Option<Met> {
-        let mut met = Met {
-            distance: farthest,
-            surface: u32::MAX,
-            front: false,
-        };
+    fn first(&mut self, ray: &Ray, direction: Vec3, farthest: f32, any: bool) -> Option<Hit> {
+        let mut met = Met::nothing(farthest);
         let facets = self.facets;
         if facets.nodes.is_empty() {
             for block in &facets.blocks {
@@ -83,7 +74,51 @@ impl<'a> Caster<'a> {
         } else {
             facets.descend(ray, direction, &mut met, any, &mut self.waiting);
         }
-        (met.distance < farthest).then_some(met)
+        met.hit(farthest)
+    }
+}
+
+/// Casts rays from one point, one after the other: less work for each where surfaces are few.
+pub struct PointCaster<'a> {
+    caster: Caster<'a>,
+    from: Vec3,
+    /// One for each block, where all are asked.
+    starts: Vec<Start>,
+}
+
+impl<'a> PointCaster<'a> {
+    pub(super) fn new(facets: &'a Facets, from: Vec3) -> Self {
+        let blocks = facets.blocks.iter();
+        let starts = if facets.nodes.is_empty() {
+            blocks.map(|block| block.start(from)).collect()
+        } else {
+            Vec::new()
+        };
+        Self {
+            caster: Caster::new(facets),
+            from,
+            starts,
+        }
+    }
+
+    /// The surface that a ray meets first.
+    #[must_use]
+    pub fn nearest(&mut self, direction: Vec3) -> Option<Hit> {
+        if self.starts.is_empty() {
+            return self.caster.nearest(self.from, direction);
+        }
+        let mut met = Met::nothing(f32::INFINITY);
+        let direction = direction.to_array().map(Vec4::splat);
+        for (block, start) in self.caster.facets.blocks.iter().zip(&self.starts) {
+            block.meet_from(start, direction, &mut met);
+        }
+        met.hit(f32::INFINITY)
+    }
+}
+
+impl std::fmt::Debug for PointCaster<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("PointCaster").finish_non_exhaustive()
     }
 }
 

@@ -26,7 +26,7 @@ use relume::refine::Lanes;
 use relume::refine::krylov::{self, Work};
 use relume::scene::{Scene, Surface};
 
-use crate::bvh::{Bvh, Caster, lifted};
+use crate::bvh::{Bvh, Hit, lifted};
 use crate::mesh::Locator;
 use crate::noise;
 
@@ -171,10 +171,10 @@ impl<'a> Rays<'a> {
         let first = Vec2::from_angle(TAU * noise::unit(seed));
         let frame = Frame::new(polygon);
         let from = lifted(polygon, point);
-        let mut caster = self.bvh.caster();
+        let mut caster = self.bvh.caster_from(from);
         fan.0.iter().map(move |step| {
             let direction = frame.direction(step.across(0, first));
-            self.end(&mut caster, from, direction)
+            self.end(caster.nearest(direction)?, from, direction)
         })
     }
 
@@ -185,7 +185,8 @@ impl<'a> Rays<'a> {
         let across = Vec2::from_angle(TAU * turn) * share.sqrt();
         let direction = Frame::new(polygon).direction(across);
         let from = lifted(polygon, point);
-        self.end(&mut self.bvh.caster(), from, direction)
+        let hit = self.bvh.caster().nearest(from, direction)?;
+        self.end(hit, from, direction)
     }
 
     /// Casts a ray for every step from an element, and notes where each ends.
@@ -210,23 +211,21 @@ impl<'a> Rays<'a> {
                 None => NOTHING,
                 Some(met) if dark.contains(met.surface, met.side()) => DARK,
                 Some(met) => {
-                    let position = from + direction * met.distance;
-                    let element = self.locator.element(met.surface, met.side(), position);
-                    element.unwrap_or(NOTHING)
+                    let end = self.end(met, from, direction);
+                    end.map_or(NOTHING, |end| end.element)
                 }
             };
         }
     }
 
-    /// Where a ray meets an element; `None` when it escapes or is absorbed.
-    fn end(&self, caster: &mut Caster, from: Vec3, direction: Vec3) -> Option<End> {
-        let met = caster.nearest(from, direction)?;
-        let position = from + direction * met.distance;
-        let element = self.locator.element(met.surface, met.side(), position)?;
+    /// The element that a ray met; `None` where it is absorbed.
+    fn end(&self, hit: Hit, from: Vec3, direction: Vec3) -> Option<End> {
+        let position = from + direction * hit.distance;
+        let element = self.locator.element(hit.surface, hit.side(), position)?;
         Some(End {
             element,
             position,
-            distance: met.distance,
+            distance: hit.distance,
         })
     }
 }

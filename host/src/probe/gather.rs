@@ -16,9 +16,8 @@ use std::borrow::Cow;
 
 use glam::Vec3;
 use relume::color::Rgb;
-use relume::geometry::Polygon;
 use relume::luminaire;
-use relume::mesh::Side;
+use relume::mesh::{Element, Side};
 use relume::scene::Surface;
 
 use super::Part;
@@ -62,8 +61,19 @@ pub(super) struct Gatherer<'a> {
     lamps: Vec<Lamp>,
     /// Direct irradiance of the elements, light inside.
     direct: Cow<'a, [Rgb]>,
+    grounds: Vec<Ground>,
     patches: Vec<RadiantPatch>,
     far: f32,
+}
+
+/// What a ray finds at its end: an element.
+struct Ground {
+    reflectance: Rgb,
+    /// Reflectance over the share that light can reach.
+    exposed: Rgb,
+    /// Edge of a square as large, m.
+    size: f32,
+    patch: u32,
 }
 
 impl<'a> Gatherer<'a> {
@@ -87,6 +97,7 @@ impl<'a> Gatherer<'a> {
             locator: Locator::new(solution.mesh.view()),
             fan: Fan::new(rays),
             direct,
+            grounds: grounds(solution),
             patches: radiant_patches(solution),
             bvh,
             lamps: faces
@@ -173,8 +184,8 @@ impl<'a> Gatherer<'a> {
     }
 
     fn is_in_far_patch(&self, end: &End, from: Vec3) -> bool {
-        let element = self.solution.mesh.elements.get(end.element as usize);
-        let patch = element.and_then(|element| self.patches.get(element.patch as usize));
+        let ground = self.grounds.get(end.element as usize);
+        let patch = ground.and_then(|ground| self.patches.get(ground.patch as usize));
         patch.is_none_or(|patch| patch.is_far(from))
     }
 
@@ -187,26 +198,25 @@ impl<'a> Gatherer<'a> {
         mut path: Path,
         values: &mut [Rgb],
     ) {
-        let mesh = self.solution.mesh.view();
         for step in 0..MOST_STEPS {
             let index = end.element as usize;
-            let Some(element) = mesh.elements.get(index) else {
+            let Some(ground) = self.grounds.get(index) else {
                 return;
             };
-            path.share = path.share * element.reflectance;
-            let exposed = path.share * self.solution.exposed[index].recip();
-            let edges = end.distance / element.area.sqrt();
-            let face = mesh.element_face(element).filter(|_| edges < NEAR);
+            let exposed = path.share * ground.exposed;
             let all = values.iter_mut().zip(self.solution.element(index));
-            let Some(face) = face else {
+            if end.distance >= NEAR * ground.size {
                 all.for_each(|(value, all)| *value += exposed * *all);
                 return;
-            };
+            }
 
-            let place = spot_at(&face.polygon, end.position);
+            path.share = path.share * ground.reflectance;
+            let Some(place) = self.place(&end) else {
+                return;
+            };
             self.add_direct_at(caster, place, path, values);
-            let last = step + 1 == MOST_STEPS;
-            if last || edges >= SHORT {
+            let is_last = step + 1 == MOST_STEPS;
+            if is_last || end.distance >= SHORT * ground.size {
                 let parts = values.iter_mut().zip(self.solution.element(index));
                 for ((value, all), own) in parts.zip(self.element_direct(index)) {
                     *value += exposed * (*all - *own).max(Rgb::BLACK);
@@ -222,19 +232,30 @@ impl<'a> Gatherer<'a> {
         }
     }
 
+    /// The place where a ray ends, a little away from the edges of its polygon.
+    fn place(&self, end: &End) -> Option<Spot> {
+        let mesh = self.solution.mesh.view();
+        let element = mesh.elements.get(end.element as usize)?;
+        let outline = mesh.element_face(element)?.polygon;
+        Some(Spot {
+            position: end.position + (outline.center() - end.position) * END_INWARDS,
+            normal: outline.normal(),
+            outline,
+        })
+    }
+
     fn element_direct(&self, element: usize) -> &[Rgb] {
         let lights = self.solution.lights.len();
         let first = element * lights;
         self.direct.get(first..first + lights).unwrap_or_default()
     }
 
-    /// Adds direct irradiance by one shadow ray to each lamp and luminaire; the sky's as the element
-    /// has it.
+    /// Adds direct irradiance by one shadow ray to each lamp, and by one set of directions to the sky.
     fn add_direct_at(&self, caster: &mut Caster, spot: Spot, path: Path, values: &mut [Rgb]) {
         let from = lifted(&spot.outline, spot.position);
         for lamp in &self.lamps {
             if let Some((factor, point)) = lamp.at(spot, path.at)
-                && caster.sees(from, lifted(lamp.polygon(), point))
+                && caster.sees(from, point)
             {
                 values[lamp.emission.light as usize] += path.share * (lamp.emission.share * factor);
             }
@@ -260,13 +281,16 @@ struct Path {
     number: u64,
 }
 
-/// A place where a ray ends, a little away from the edges of its polygon.
-fn spot_at(outline: &Polygon, position: Vec3) -> Spot {
-    Spot {
-        position: position + (outline.center() - position) * END_INWARDS,
-        normal: outline.normal(),
-        outline: *outline,
-    }
+/// The elements as rays find them.
+fn grounds(solution: &Solution) -> Vec<Ground> {
+    let elements = solution.mesh.elements.iter().zip(&solution.exposed);
+    let ground = |(element, exposed): (&Element, &f32)| Ground {
+        reflectance: element.reflectance,
+        exposed: element.reflectance * exposed.recip(),
+        size: element.area.sqrt(),
+        patch: element.patch,
+    };
+    elements.map(ground).collect()
 }
 
 /// Direct irradiance of every element at unit emission, light inside.

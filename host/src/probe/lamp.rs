@@ -11,7 +11,7 @@ use relume::form_factor::Shooter;
 use relume::geometry::{Polygon, from_unit_square};
 use relume::scene::Emission;
 
-use crate::bvh::Bvh;
+use crate::bvh::{Bvh, lifted};
 use crate::noise;
 use crate::rows::quarters;
 
@@ -19,7 +19,7 @@ use crate::rows::quarters;
 const MOST_QUARTERINGS: u32 = 5;
 
 /// A lamp that is nearer than so many of its longest edges is close.
-const CLOSE: f32 = 3.0;
+const CLOSE: f32 = 2.0;
 
 /// How often a point of a close lamp is looked for above the horizon.
 const TRIES: u32 = 8;
@@ -41,6 +41,8 @@ pub(super) struct Spot {
 pub(super) struct Lamp {
     shooter: Shooter,
     pub emission: Emission,
+    /// What lifts its points off it.
+    lift: Vec3,
     center: Vec3,
     /// Square of the distance from the middle within which it is close.
     close: f32,
@@ -51,13 +53,10 @@ impl Lamp {
         Self {
             shooter: Shooter::new(polygon),
             emission,
+            lift: lift(&polygon),
             center: polygon.center(),
             close: (CLOSE * polygon.longest_edge()).powi(2),
         }
-    }
-
-    pub const fn polygon(&self) -> &Polygon {
-        self.shooter.polygon()
     }
 
     /// What a place sees of it, exactly; where much stands between, of its quarters.
@@ -66,7 +65,7 @@ impl Lamp {
     }
 
     /// The form factor of the lamp from a place, open, as it looks at one point of the lamp, and that
-    /// point; `None` where nothing of it faces the place.
+    /// point, lifted; `None` where nothing of it faces the place.
     pub fn at(&self, spot: Spot, at: [u32; 2]) -> Option<(f32, Vec3)> {
         let Spot {
             position, normal, ..
@@ -80,7 +79,7 @@ impl Lamp {
             let square = ray.length_squared();
             let (here, there) = (ray.dot(normal), -ray.dot(polygon.normal()));
             let factor = here * there * density / (PI * square * square);
-            return (here > 0.0 && there > 0.0).then_some((factor, point));
+            return (here > 0.0 && there > 0.0).then_some((factor, point + self.lift));
         }
         let factor = self.shooter.open_at_point(position, normal);
         if factor <= 0.0 {
@@ -91,8 +90,16 @@ impl Lamp {
             point([at[0].wrapping_add(shift[0]), at[1].wrapping_add(shift[1])]).0
         });
         let is_above = |point: &Vec3| (*point - position).dot(normal) > 0.0;
-        Some((factor, points.into_iter().find(is_above)?))
+        Some((factor, points.into_iter().find(is_above)? + self.lift))
     }
+}
+
+/// What lifts any point of a polygon.
+fn lift(polygon: &Polygon) -> Vec3 {
+    let vertices = polygon.vertices().iter();
+    let lifts = vertices.map(|vertex| lifted(polygon, *vertex) - *vertex);
+    let longest = lifts.max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
+    longest.unwrap_or_default()
 }
 
 fn visible_factor(lamp: &Shooter, spot: Spot, bvh: &Bvh, depth: u32) -> f32 {
