@@ -27,7 +27,7 @@ pub struct Arguments {
     /// Evaluate direct light exactly at the points and gather the indirect there: better than the mesh
     #[arg(long, requires = "points", conflicts_with = "elements")]
     gather: bool,
-    /// Rays that gather at each point: 64 for errors of some 2 %, 1024 for some tenths of a per cent
+    /// Rays that gather at each point: 64 for errors of some 2 %, 2048 for some tenths of a per cent
     #[arg(long, value_name = "N", requires = "gather", default_value_t = RAYS, value_parser = clap::value_parser!(u32).range(1..=MOST_RAYS))]
     rays: u32,
     /// Where the CSV goes; `-` is stdout

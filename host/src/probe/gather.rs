@@ -9,8 +9,8 @@
 //! matters (final gather; Reichert 1992). What counts of `h` is the light on the part of it that light
 //! can reach. Where a ray ends within a few elements even the edge of a shadow matters: there the
 //! direct part of `E_h` is that of the place itself, by one shadow ray to each lamp; and where it ends
-//! within a quarter of an element, as in corners, the ray goes on for the indirect part, too (Christensen
-//! 1999, secondary final gathering). Assumption: lamps radiate evenly from their front.
+//! nearer still, as in corners, the ray goes on for the indirect part, too (Christensen 1999, secondary
+//! final gathering). Assumption: lamps radiate evenly from their front.
 
 use std::borrow::Cow;
 
@@ -33,8 +33,9 @@ use crate::solution::Solution;
 /// Where rays end that are shorter than so many edges of the element there, direct light is looked at.
 const NEAR: f32 = 2.0;
 
-/// Rays that are shorter than so many edges go on.
-const SHORT: f32 = 0.25;
+/// Of so many rays those go on that are shorter than one edge; the length grows with the root of their
+/// number, as their scatter falls with it.
+const RAYS_PER_SQUARE_EDGE: f32 = 1024.0;
 
 /// Parts of a ray at most: many in a narrow gap.
 const MOST_STEPS: u64 = 16;
@@ -62,6 +63,8 @@ pub(super) struct Gatherer<'a> {
     /// Direct irradiance of the elements, light inside.
     direct: Cow<'a, [Rgb]>,
     grounds: Vec<Ground>,
+    /// Rays that are shorter than so many edges go on.
+    short: f32,
     patches: Vec<RadiantPatch>,
     far: f32,
 }
@@ -98,6 +101,7 @@ impl<'a> Gatherer<'a> {
             fan: Fan::new(rays),
             direct,
             grounds: grounds(solution),
+            short: (rays as f32 / RAYS_PER_SQUARE_EDGE).sqrt(),
             patches: radiant_patches(solution),
             bvh,
             lamps: faces
@@ -205,7 +209,7 @@ impl<'a> Gatherer<'a> {
             };
             let exposed = path.share * ground.exposed;
             let all = values.iter_mut().zip(self.solution.element(index));
-            if end.distance >= NEAR * ground.size {
+            if end.distance >= NEAR.max(self.short) * ground.size {
                 all.for_each(|(value, all)| *value += exposed * *all);
                 return;
             }
@@ -216,7 +220,7 @@ impl<'a> Gatherer<'a> {
             };
             self.add_direct_at(caster, place, path, values);
             let is_last = step + 1 == MOST_STEPS;
-            if is_last || end.distance >= SHORT * ground.size {
+            if is_last || end.distance >= self.short * ground.size {
                 let parts = values.iter_mut().zip(self.solution.element(index));
                 for ((value, all), own) in parts.zip(self.element_direct(index)) {
                     *value += exposed * (*all - *own).max(Rgb::BLACK);

@@ -193,7 +193,7 @@ pub fn probe_points(
 }
 
 /// Rays that gather light at a point, by default.
-pub const RAYS: u32 = 1024;
+pub const RAYS: u32 = 2048;
 
 /// The same, with direct light evaluated exactly at every point and indirect light gathered there by
 /// so many rays.
