@@ -9,6 +9,8 @@ use crate::mesh::Mesh;
 pub struct PatchState {
     /// Number of its row in the storage, plus one; 0 when the row is not known.
     pub(super) row: u32,
+    /// True when that row was not evaluated.
+    pub(super) is_estimated: bool,
     /// True once its own emission has been shot.
     pub(super) has_emitted: bool,
     /// Reflected share of the row at hand: `sum_j A_j rho_j F_ji / A_p`.
@@ -19,6 +21,7 @@ impl PatchState {
     /// Nothing known, nothing shot.
     pub const EMPTY: Self = Self {
         row: 0,
+        is_estimated: false,
         has_emitted: false,
         gathered: Rgb::BLACK,
     };

@@ -8,9 +8,10 @@ use relume::form_factor::Shooter;
 use relume::geometry::{Polygon, gauss_points};
 use relume::mesh::Mesh;
 use relume::scene::{Luminaire, Surface};
+use relume::visibility::Visibility;
 
 use super::AccuracyError;
-use crate::bake::{Meshed, Settings};
+use crate::bake::{Meshed, Missing, Settings};
 use crate::gather::RAYS_PER_PASS;
 use crate::mesh::OwnedMesh;
 use crate::rows::{Parallel, RowFiller};
@@ -143,7 +144,7 @@ pub(super) fn ways(ours: &Settings, mesh: &OwnedMesh) -> Vec<Way> {
             plain(shots),
         ));
         let settings = Settings {
-            ambient: true,
+            missing: Missing::Ambient,
             ..plain(shots)
         };
         ways.push(way(Family::Ambient, variant, Rows::Exact, settings));
@@ -238,6 +239,10 @@ struct Logged<'a, F> {
 }
 
 impl<F: RowFiller> RowFiller for Logged<'_, F> {
+    fn visibility(&self) -> &impl Visibility {
+        self.filler.visibility()
+    }
+
     fn luminaire(&self, mesh: &Mesh, luminaire: &Luminaire, far: f32, row: &mut [f32]) {
         self.filler.luminaire(mesh, luminaire, far, row);
     }
