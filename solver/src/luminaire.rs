@@ -223,14 +223,11 @@ pub fn far(scene: &Scene) -> f32 {
 /// `far` as for [`irradiance`]. A gap is overlooked when it fills much less than a ray of any middle's view.
 #[must_use]
 pub fn is_closed(mesh: &Mesh, far: f32, visibility: &impl Visibility) -> bool {
-    (0..).zip(mesh.patches).all(|(number, patch)| {
-        let face = mesh.faces.get(patch.face as usize);
-        let receives = face.is_some_and(|face| face.element_count > 0);
-        let polygon = mesh.patch_polygon(number).filter(|_| receives);
-        polygon.is_none_or(|polygon| {
-            let (middle, normal) = (polygon.center(), polygon.normal());
-            at_point(&Source::Sky, middle, normal, far, 1, visibility) <= 0.0
-        })
+    let patches = (0..mesh.patches.len() as u32).filter(|patch| mesh.receives(*patch));
+    let mut polygons = patches.filter_map(|patch| mesh.patch_polygon(patch));
+    polygons.all(|polygon| {
+        let (middle, normal) = (polygon.center(), polygon.normal());
+        at_point(&Source::Sky, middle, normal, far, 1, visibility) <= 0.0
     })
 }
 

@@ -54,7 +54,9 @@ impl Shooter {
         factors.sum::<f32>().min(1.0)
     }
 
-    fn is_near(&self, receiver: &Polygon) -> bool {
+    /// True when the middle of the receiver does not stand for all of it.
+    #[must_use]
+    pub fn is_near(&self, receiver: &Polygon) -> bool {
         let reach = (NEAR * receiver.longest_edge()).max(self.polygon.longest_edge());
         (receiver.center() - self.polygon.center()).length_squared() < reach * reach
     }

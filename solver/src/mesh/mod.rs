@@ -123,6 +123,14 @@ impl<'a> Mesh<'a> {
         )
     }
 
+    /// True for a patch that has elements, and so reflects; false for a black lamp.
+    #[must_use]
+    pub fn receives(&self, patch: u32) -> bool {
+        let patch = self.patches.get(patch as usize);
+        let face = patch.and_then(|patch| self.faces.get(patch.face as usize));
+        face.is_some_and(|face| face.element_count > 0)
+    }
+
     /// What a patch emits.
     #[must_use]
     pub fn patch_emission(&self, patch: u32) -> Option<Emission> {

@@ -70,13 +70,15 @@ impl<const K: usize> Refinement<'_, K> {
     pub(super) fn keep(&mut self, patch: u32, row: &[f32]) -> bool {
         let n = self.mesh.elements.len();
         let slot = self.rows_kept as usize;
+        // What receives nothing never shoots again: where room is scarce, it is for others.
+        let is_waste = self.capacity < self.mesh.patches.len() && !self.mesh.receives(patch);
         let (Some(factors), Some(state)) = (
             self.storage.rows.factors.get_mut(slot * n..(slot + 1) * n),
             self.storage.patches.get_mut(patch as usize),
         ) else {
             return false;
         };
-        if slot >= self.capacity || state.row != 0 {
+        if slot >= self.capacity || state.row != 0 || is_waste {
             return false;
         }
         for (kept, factor) in factors.iter_mut().zip(row) {

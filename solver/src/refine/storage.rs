@@ -79,7 +79,7 @@ pub struct Storage<'a, const K: usize> {
 /// Memory for rows that are not to be evaluated twice, and for solving the system of their patches.
 ///
 /// A row takes `4 n + 12 p` bytes. With none of it a refinement shoots again what it has seen
-/// before, as published.
+/// before, as published; where there is not room for all, none is wasted on black lamps, which shoot but once.
 #[derive(Debug, Default)]
 pub struct RowStorage<'a, const K: usize> {
     /// Form factors, `n` for each row.
