@@ -12,8 +12,9 @@ use relume::form_factor::{self, Shooter};
 use relume::geometry::Polygon;
 use relume::luminaire;
 use relume::mesh::Mesh;
-use relume::scene::Luminaire;
-use relume::visibility::{Occluders, Shaft};
+use relume::refine::Refinement;
+use relume::scene::{Luminaire, Scene};
+use relume::visibility::{Occluders, Shaft, Visibility};
 
 use crate::bvh::{Bvh, Narrowed};
 
@@ -31,6 +32,9 @@ const MOST_QUARTERINGS: u32 = 3;
 
 /// Fills rows.
 pub trait RowFiller {
+    /// Who sees whom.
+    fn visibility(&self) -> &impl Visibility;
+
     /// Direct irradiance of every element by a luminaire at unit emission, W/m2.
     fn luminaire(&self, mesh: &Mesh, luminaire: &Luminaire, far: f32, row: &mut [f32]);
 
@@ -49,6 +53,45 @@ pub trait RowFiller {
     fn lamp(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
         self.shooter(mesh, polygon, row);
     }
+
+    /// Estimates of the form factors from every element to a polygon.
+    fn estimate(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
+        let shooter = Shooter::new(*polygon);
+        form_factor::estimate(mesh, &shooter, 0, self.visibility(), row);
+    }
+}
+
+/// Estimates the rows that a refinement misses ([`Refinement::close`]) and solves with them.
+///
+/// False, and no change, where there is no room for all rows.
+pub fn close<const K: usize>(
+    refinement: &mut Refinement<K>,
+    mesh: &Mesh,
+    scene: &Scene,
+    filler: &impl RowFiller,
+) -> bool {
+    let is_closed = luminaire::is_closed(mesh, luminaire::far(scene), filler.visibility());
+    let dark = is_closed.then(|| dark_shares(mesh, scene, filler));
+    let has_closed = refinement.close(dark.as_deref(), |patch, row| {
+        if let Some(polygon) = mesh.patch_polygon(patch) {
+            filler.estimate(mesh, &polygon, row);
+        }
+    });
+    refinement.finish();
+    has_closed
+}
+
+/// What share of every element's view has no patches.
+fn dark_shares(mesh: &Mesh, scene: &Scene, filler: &impl RowFiller) -> Vec<f32> {
+    let mut dark = vec![0.0; mesh.elements.len()];
+    let mut row = dark.clone();
+    for side in mesh.dark_sides(scene.surfaces()) {
+        filler.estimate(mesh, &side, &mut row);
+        for (sum, factor) in dark.iter_mut().zip(&row) {
+            *sum += factor;
+        }
+    }
+    dark
 }
 
 /// The solver alone, by brute force: what a device does.
@@ -59,6 +102,10 @@ pub struct Serial<'a>(
 );
 
 impl RowFiller for Serial<'_> {
+    fn visibility(&self) -> &impl Visibility {
+        &self.0
+    }
+
     fn luminaire(&self, mesh: &Mesh, luminaire: &Luminaire, far: f32, row: &mut [f32]) {
         luminaire::fill(mesh, luminaire, far, 0, &self.0, row);
     }
@@ -103,6 +150,10 @@ impl<'a> Parallel<'a> {
 }
 
 impl RowFiller for Parallel<'_> {
+    fn visibility(&self) -> &impl Visibility {
+        self.bvh
+    }
+
     fn luminaire(&self, mesh: &Mesh, luminaire: &Luminaire, far: f32, row: &mut [f32]) {
         row.par_chunks_mut(CHUNK)
             .enumerate()
@@ -115,7 +166,18 @@ impl RowFiller for Parallel<'_> {
     fn shooter(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
         let shooter = Shooter::new(*polygon);
         self.fill(row, |receiver, range| {
-            self.factors(mesh, &shooter, receiver, range)
+            self.factors(mesh, &shooter, receiver, range, |element, seen| {
+                shooter.form_factor(element, seen)
+            })
+        });
+    }
+
+    fn estimate(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
+        let shooter = Shooter::new(*polygon);
+        self.fill(row, |receiver, range| {
+            self.factors(mesh, &shooter, receiver, range, |element, seen| {
+                shooter.estimate(element, seen)
+            })
         });
     }
 
@@ -148,12 +210,16 @@ impl Parallel<'_> {
         shooter: &Shooter,
         receiver: &Polygon,
         range: &Range<usize>,
+        factor: impl Fn(&Polygon, &Narrowed) -> f32,
     ) -> Vec<f32> {
         if shooter.is_out_of_sight(receiver) {
             return Vec::new();
         }
         let narrowed = self.narrowed(shooter.polygon(), receiver);
-        self.element_factors(mesh, shooter, range, &narrowed)
+        let receivers = self.receivers(mesh, range);
+        receivers
+            .map(|receiver| factor(&receiver, &narrowed))
+            .collect()
     }
 
     /// The same; where much stands between, the lamp is quartered, so that less is in the way of each
@@ -172,7 +238,10 @@ impl Parallel<'_> {
         }
         let narrowed = self.narrowed(lamp, receiver);
         if narrowed.blockers() <= MANY_BLOCKERS || depth == MOST_QUARTERINGS {
-            return self.element_factors(mesh, &shooter, range, &narrowed);
+            let receivers = self.receivers(mesh, range);
+            return receivers
+                .map(|receiver| shooter.form_factor(&receiver, &narrowed))
+                .collect();
         }
         let mut sum = vec![0.0; range.len()];
         for quarter in quarters(lamp) {
@@ -190,19 +259,12 @@ impl Parallel<'_> {
         self.bvh.narrowed(&shaft)
     }
 
-    fn element_factors(
-        &self,
-        mesh: &Mesh,
-        shooter: &Shooter,
-        range: &Range<usize>,
-        visibility: &Narrowed,
-    ) -> Vec<f32> {
+    /// Outlines of the elements of one patch.
+    fn receivers(&self, mesh: &Mesh, range: &Range<usize>) -> impl Iterator<Item = Polygon> {
         let elements = self.elements[range.clone()].iter();
         elements
             .filter_map(|element| mesh.elements.get(*element as usize))
             .filter_map(|element| mesh.element_polygon(element))
-            .map(|receiver| shooter.form_factor(&receiver, visibility))
-            .collect()
     }
 }
 
