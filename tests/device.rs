@@ -11,7 +11,7 @@ use embedded_graphics::image::GetPixel;
 use embedded_graphics::pixelcolor::raw::{LittleEndian, RawU16};
 use embedded_graphics::pixelcolor::{Rgb565, RgbColor};
 use embedded_graphics::prelude::Point;
-use relume::atlas::{self, Atlas, Channels, Contents, LightEntry, Quantity};
+use relume::atlas::{self, Atlas, Contents, LightEntry, Quantity};
 use relume::code::{Code, Scale};
 use relume::color::Rgb;
 use relume::draw::{Sample, Shown, paint};
@@ -76,20 +76,18 @@ fn bake_and_pack(flash: &mut [u8]) -> usize {
     let lights: Vec<LightEntry> = names
         .iter()
         .zip(0..)
-        .map(|(name, light)| LightEntry {
-            name,
-            emission: Rgb::splat(20.0),
-            scale: Scale::fitting(largest(light)).expect("finite"),
+        .map(|(name, light)| {
+            let scale = Scale::fitting(largest(light)).expect("finite");
+            LightEntry::exponential(name, Rgb::splat(20.0), Code::Exp8s, scale)
         })
         .collect();
     let outlines: Vec<_> = surfaces.iter().map(|s| *s.polygon()).collect();
     let contents = Contents {
-        code: Code::Exp8s,
-        channels: Channels::Rgb,
         quantity: Quantity::Irradiance,
         lights: &lights,
         elements: ELEMENTS as u32,
         errors: None,
+        tiles: &[],
         mesh: Some((&outlines, mesh)),
     };
     atlas::write(&contents, |e, l| refinement.irradiance(e, l), flash).expect("it fits")

@@ -71,10 +71,9 @@ pub fn meshed(builtin: &Builtin) -> OwnedMesh {
 }
 
 /// Irradiance in RGB with the mesh, in the given code.
-pub const fn format(code: Code) -> Format {
+pub fn format(code: Code) -> Format {
     Format {
-        code,
-        channels: Channels::Rgb,
+        packing: code.into(),
         quantity: Quantity::Irradiance,
         mesh: true,
     }

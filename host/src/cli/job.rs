@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use relume::atlas::{Atlas, Channels, Quantity};
+use relume::atlas::{Atlas, Quantity};
 use relume::code::Code;
 use relume::color::Rgb;
 use serde_json::json;
@@ -160,8 +160,7 @@ fn make(folder: &mut Folder) -> Result<serde_json::Value> {
     let baked = watched(|watch| bake_keeping(&scene, &settings, watch))?.ok_or(Interrupted)?;
     let solution = &baked.solution;
     let format = Format {
-        code: Code::Exp8s,
-        channels: Channels::Rgb,
+        packing: Code::Exp8s.into(),
         quantity: Quantity::Irradiance,
         mesh: true,
     };
@@ -213,7 +212,7 @@ fn make(folder: &mut Folder) -> Result<serde_json::Value> {
             "residual": baked.residual(),
             "bake_seconds": baked.time.as_secs_f64(),
             "atlas_bytes": atlas_bytes.len(),
-            "code_bytes": atlas.all_codes().len(),
+            "code_bytes": atlas.code_bytes(),
             "solution_bytes": solution_bytes.len(),
             "max_error_codes": error.codes,
             "codes_shown": error.codes_shown,

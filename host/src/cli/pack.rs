@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use relume::atlas::{Atlas, Channels, Quantity};
+use relume::atlas::{Atlas, Quantity};
 use relume::code::Code;
 use serde_json::json;
 
@@ -52,8 +52,7 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
         bail!("{path}: this is an atlas already; give the solution that it was packed from");
     };
     let format = Format {
-        code: arguments.code,
-        channels: Channels::Rgb,
+        packing: arguments.code.into(),
         quantity: match arguments.quantity {
             QuantityName::Irradiance => Quantity::Irradiance,
             QuantityName::Radiosity => Quantity::Radiosity,
@@ -66,18 +65,18 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     tell!(
         "{}: {}, {} for {} codes, error at most {:.2} display codes ({}), {:.2} as shown",
         output.display(),
-        format.code,
+        format.packing.code,
         human_bytes(bytes.len()),
-        atlas.all_codes().len(),
+        atlas.code_bytes(),
         error.codes,
         error.worst_state,
         error.codes_shown,
     );
     Ok(Outcome::done(json!({
         "file": output.display().to_string(),
-        "code": format.code.name(),
+        "code": format.packing.code.name(),
         "bytes": bytes.len(),
-        "code_bytes": atlas.all_codes().len(),
+        "code_bytes": atlas.code_bytes(),
         "elements": atlas.element_count(),
         "lights": atlas.light_count(),
         "max_error_codes": error.codes,
