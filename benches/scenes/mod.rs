@@ -10,7 +10,7 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use criterion::Criterion;
-use relume::atlas::{Channels, Quantity};
+use relume::atlas::Quantity;
 use relume::code::Code;
 use relume_host::bake::{Settings, bake};
 use relume_host::builtin::{Builtin, PaperLamps, cornell_box, paper_room};
