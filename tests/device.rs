@@ -18,7 +18,7 @@ use relume::draw::{Sample, Shown, paint};
 use relume::form_factor;
 use relume::mesh::{MeshStorage, subdivide};
 use relume::refine::{Choice, FixedStorage, Refinement};
-use relume::relight::{FixedMix, change_fixed, relight_fixed};
+use relume::relight::{FixedMix, FixedWeight, change_fixed, relight_fixed};
 use relume::scene::Scene;
 use relume::tone::{Exposure, radiance};
 use relume::visibility::Occluders;
@@ -139,7 +139,7 @@ fn a_device_bakes_packs_relights_and_draws_the_papers_room() {
     let atlas = Atlas::parse(&flash[..length]).expect("it was just written");
 
     let mix = [Rgb::splat(20.0); LIGHTS];
-    let mut weights = [[0; 3]; LIGHTS];
+    let mut weights = [FixedWeight::EMPTY; LIGHTS];
     let mut fixed = FixedMix::new(&atlas, &mix, &mix, &mut weights).expect("it fits");
     let mut sums = [[0; 3]; ELEMENTS];
     relight_fixed(&atlas, &fixed, &mut sums).expect("it fits");
