@@ -1,105 +1,222 @@
-//! What packing cost.
+//! What packing cost, over all states of [`Mixed`] and [`Solo`].
+//!
+//! A block of eight states is relit at once: for every element, the contributions of its lights times
+//! their weights in the eight states, as exact values and as decoded ones.
 
-use relume::atlas::{Atlas, Quantity, WorstError};
+use rayon::prelude::*;
+use relume::atlas::{Quantity, WorstError};
 use relume::color::Rgb;
-use relume::relight::RelightError;
 
-use super::unpack::contributions;
-use super::{packed_values, relight_atlas};
-use crate::display_error::{max_codes, test_mixes};
-use crate::solution::Solution;
+use super::Source;
+use crate::display_error::{Mixed, Solo, max_codes_at};
+
+/// States that are relit at once.
+const LANES: usize = 8;
+
+/// Blocks of states and lights that are judged before a limit is looked at.
+const BATCH: usize = 16;
+
+/// Red, green and blue of one element in every state of a block.
+type Lanes = [[f32; LANES]; 3];
 
 /// Errors of an atlas against its solution, in display codes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PackingError {
-    /// Largest over all states, of what is packed.
-    pub codes: f32,
-    /// The state in which it occurs.
+    /// Largest over all states.
+    pub all: WorstError,
+    /// Largest over the achromatic states: lights that only dim, each state at its own white.
+    pub achromatic: WorstError,
+    /// The state in which what is packed is worst.
     pub worst_state: String,
-    /// Largest over all states, of what is shown.
-    pub codes_shown: f32,
-    /// Largest with each light alone, in their order.
+    /// Largest with each light alone, of what is packed; in their order.
     pub per_light: Vec<f32>,
 }
 
 impl PackingError {
-    /// What the atlas states of it.
-    pub(super) const fn worst(&self) -> WorstError {
-        WorstError {
-            packed: self.codes,
-            shown: self.codes_shown,
+    /// The larger one of what is packed and what is shown.
+    #[must_use]
+    pub const fn largest(&self) -> f32 {
+        self.all.packed.max(self.all.shown)
+    }
+
+    const fn none() -> Self {
+        const NONE: WorstError = WorstError {
+            packed: 0.0,
+            shown: 0.0,
+        };
+        Self {
+            all: NONE,
+            achromatic: NONE,
+            worst_state: String::new(),
+            per_light: Vec::new(),
+        }
+    }
+
+    fn add(&mut self, found: WorstError, is_achromatic: bool, name: impl FnOnce() -> String) {
+        if found.packed > self.all.packed || self.worst_state.is_empty() {
+            self.worst_state = name();
+        }
+        raise(&mut self.all, found);
+        if is_achromatic {
+            raise(&mut self.achromatic, found);
         }
     }
 }
 
-/// Compares an atlas with the solution that it was packed from, over the mixes of [`test_mixes`].
+const fn raise(worst: &mut WorstError, found: WorstError) {
+    worst.packed = worst.packed.max(found.packed);
+    worst.shown = worst.shown.max(found.shown);
+}
+
+/// How decoded contributions, which stand as those of the source do, differ from it in all states.
 ///
-/// # Errors
-/// [`RelightError`] when the atlas belongs to another solution.
-pub fn packing_error(solution: &Solution, atlas: &Atlas) -> Result<PackingError, RelightError> {
-    let names: Vec<&str> = solution.lights.iter().map(|l| l.name.as_str()).collect();
-    let values = packed_values(solution, atlas.quantity());
-    let lights = solution.lights.len();
-    let mut worst = PackingError {
-        codes: 0.0,
-        worst_state: String::new(),
-        codes_shown: 0.0,
-        per_light: Vec::new(),
-    };
-    let decoded = contributions(atlas);
-    let mut all = vec![Rgb::BLACK; lights];
-    for (state, number) in test_mixes(&solution.nominal_mix(), &names)
-        .into_iter()
-        .zip(0..)
-    {
-        let range = state.first..state.first + state.weights.len();
-        let relit = |values: &[Rgb]| -> Vec<Rgb> {
-            values
-                .chunks(lights.max(1))
-                .map(|values| {
-                    let weighted = values[range.clone()].iter().zip(&state.weights);
-                    weighted.fold(Rgb::BLACK, |sum, (value, weight)| sum + *value * *weight)
-                })
-                .collect()
-        };
-        let exact = relit(&values);
-        // One light alone needs no kernel, which would read the codes of all the others.
-        let found = if state.weights.len() == lights {
-            relight_atlas(atlas, &state.weights)?
-        } else {
-            relit(&decoded)
-        };
-        let codes = max_codes(&exact, &found);
-        all[range.clone()].copy_from_slice(&state.weights);
-        let exitance = solution.face_exitance(&all);
-        all[range].fill(Rgb::BLACK);
-        let shown = |state: &[Rgb]| shown(solution, atlas.quantity(), state, &exitance);
-        worst.codes_shown = worst
-            .codes_shown
-            .max(max_codes(&shown(&exact), &shown(&found)));
-        if codes > worst.codes || worst.worst_state.is_empty() {
-            worst.codes = codes;
-            worst.worst_state = state.name;
+/// Stops when the error is above `limit`; what is returned then is only the least that it can be.
+pub(super) fn measure(source: &Source, decoded: &[Rgb], limit: f32) -> PackingError {
+    let mut error = foremost(source, decoded, limit);
+    let states: Vec<Mixed> = Mixed::all().skip(LANES).collect();
+    for batch in states.chunks(BATCH * LANES) {
+        if error.largest() > limit {
+            break;
         }
-        if (1..=lights).contains(&number) {
-            worst.per_light.push(codes);
+        let found: Vec<WorstError> = batch
+            .par_chunks(LANES)
+            .flat_map_iter(|states| block(source, decoded, states))
+            .collect();
+        for (state, found) in batch.iter().zip(found) {
+            error.add(found, state.is_achromatic(), || state.to_string());
         }
     }
-    Ok(worst)
+    error
 }
 
-/// `M + rho E` of every element.
-fn shown(solution: &Solution, quantity: Quantity, state: &[Rgb], exitance: &[Rgb]) -> Vec<Rgb> {
-    let mesh = &solution.mesh;
-    let elements = mesh.elements.iter().zip(state);
-    elements
-        .map(|(element, value)| {
-            let face = mesh.patches[element.patch as usize].face;
-            let reflected = match quantity {
-                Quantity::Irradiance => element.reflectance * *value,
-                Quantity::Radiosity => *value,
-            };
-            exitance[face as usize] + reflected
+/// The same for the states that usually decide: every light alone, and one block of the mixed ones.
+pub(super) fn foremost(source: &Source, decoded: &[Rgb], limit: f32) -> PackingError {
+    let mut error = PackingError::none();
+    let states: Vec<Mixed> = Mixed::all().take(LANES).collect();
+    for (state, found) in states.iter().zip(block(source, decoded, &states)) {
+        error.add(found, state.is_achromatic(), || state.to_string());
+    }
+    let lights = &source.solution.lights;
+    let tags: Vec<usize> = (0..lights.len()).collect();
+    for batch in tags.chunks(BATCH * LANES) {
+        if error.largest() > limit {
+            break;
+        }
+        let found: Vec<[WorstError; 4]> = batch
+            .par_iter()
+            .map(|light| solos(source, decoded, *light))
+            .collect();
+        for (light, found) in batch.iter().zip(found) {
+            let alone = found.iter().map(|found| found.packed);
+            error.per_light.push(alone.fold(0.0, f32::max));
+            for (solo, found) in Solo::ALL.into_iter().zip(found) {
+                error.add(found, solo.is_achromatic(), || {
+                    format!("{} {solo}", lights[*light].name)
+                });
+            }
+        }
+    }
+    error
+}
+
+/// The error in each of some states, at most [`LANES`].
+fn block(source: &Source, decoded: &[Rgb], states: &[Mixed]) -> Vec<WorstError> {
+    let nominal = source.solution.nominal_mix();
+    let mut weights = vec![[[0.0; LANES]; 3]; nominal.len()];
+    for ((weights, nominal), light) in weights.iter_mut().zip(&nominal).zip(0..) {
+        for (lane, state) in states.iter().enumerate() {
+            let weight = state.weight(light, *nominal).to_array();
+            (0..3).for_each(|channel| weights[channel][lane] = weight[channel]);
+        }
+    }
+    let relit = |values: &[Rgb]| -> Vec<Lanes> {
+        let elements = values.chunks(nominal.len().max(1));
+        elements.map(|values| relit(values, &weights)).collect()
+    };
+    let (exact, found) = (relit(&source.values), relit(decoded));
+    let judged = states.iter().enumerate().map(|(lane, state)| {
+        let of = |lanes: &Lanes| Rgb::from_array(lanes.map(|channel| channel[lane]));
+        judge(
+            source,
+            state.brightness(),
+            |light| weights.get(light as usize).map_or(Rgb::BLACK, of),
+            exact.iter().map(of),
+            found.iter().map(of),
+        )
+    });
+    judged.collect()
+}
+
+/// One element: the sum over its lights in every state.
+fn relit(values: &[Rgb], weights: &[Lanes]) -> Lanes {
+    let mut sums = [[0.0; LANES]; 3];
+    for (value, weights) in values.iter().zip(weights) {
+        let channels = sums.iter_mut().zip(weights).zip(value.to_array());
+        for ((sums, weights), value) in channels {
+            for (sum, weight) in sums.iter_mut().zip(weights) {
+                *sum += value * weight;
+            }
+        }
+    }
+    sums
+}
+
+/// The error with one light alone, in every colour.
+fn solos(source: &Source, decoded: &[Rgb], light: usize) -> [WorstError; 4] {
+    let lights = &source.solution.lights;
+    let column = |values: &[Rgb]| -> Vec<Rgb> {
+        let own = values.iter().skip(light).step_by(lights.len());
+        own.copied().collect()
+    };
+    let (exact, found) = (column(&source.values), column(decoded));
+    Solo::ALL.map(|solo| {
+        let weight = solo.weight(lights[light].emission);
+        judge(
+            source,
+            1.0,
+            |other| {
+                if other as usize == light {
+                    weight
+                } else {
+                    Rgb::BLACK
+                }
+            },
+            exact.iter().map(|value| *value * weight),
+            found.iter().map(|value| *value * weight),
+        )
+    })
+}
+
+/// The error of one state, as it is packed and as it is shown: `M + rho E`.
+fn judge(
+    source: &Source,
+    brightness: f32,
+    weight: impl Fn(u32) -> Rgb,
+    exact: impl Iterator<Item = Rgb> + Clone,
+    found: impl Iterator<Item = Rgb> + Clone,
+) -> WorstError {
+    let mesh = &source.solution.mesh;
+    let exitances: Vec<Rgb> = mesh
+        .faces
+        .iter()
+        .map(|face| {
+            face.emission
+                .map_or(Rgb::BLACK, |emission| emission.share * weight(emission.light))
         })
-        .collect()
+        .collect();
+    let shown = |value: Rgb, element: &relume::mesh::Element| {
+        let reflected = match source.quantity {
+            Quantity::Irradiance => element.reflectance * value,
+            Quantity::Radiosity => value,
+        };
+        exitances[mesh.patches[element.patch as usize].face as usize] + reflected
+    };
+    WorstError {
+        packed: max_codes_at(brightness, exact.clone(), found.clone()),
+        shown: max_codes_at(
+            brightness,
+            exact.zip(&mesh.elements).map(|(v, e)| shown(v, e)),
+            found.zip(&mesh.elements).map(|(v, e)| shown(v, e)),
+        ),
+    }
 }
