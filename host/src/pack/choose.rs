@@ -13,7 +13,15 @@ use relume::atlas::Quantity;
 use relume::code::Code;
 
 /// Shares of a light's white above which steps of `tiles` are logarithmic.
-const WHITES: [f32; 7] = [1.0, 0.5, 0.25, 0.125, 0.062_5, 0.031_25, 0.015_625];
+const WHITES: [f32; 7] = [
+    1.0,
+    1.0 / 4.0,
+    1.0 / 16.0,
+    1.0 / 64.0,
+    1.0 / 256.0,
+    1.0 / 1024.0,
+    1.0 / 4096.0,
+];
 
 /// Most steps of an octave.
 const FINEST: u16 = 1024;

@@ -18,17 +18,18 @@ use relume::code::{Code, Curve, Scale, display_code};
 use relume::color::Rgb;
 
 use super::{PackError, Packing};
+use crate::display_error::shown_code;
 use crate::picture::white;
 use crate::solution::Solution;
 
 /// Values of a channel on which curves are judged: this many of the largest, and of all by rank.
-const SAMPLES: usize = 256;
+const SAMPLES: usize = 1024;
 
-/// Whites that are tried: own white over powers of the square root of 2.
-const WHITES: i32 = 11;
+/// Whites that are tried: own white over powers of the fourth root of 2.
+const WHITES: u8 = 25;
 
 /// Spacings that are tried, in quarters of a level beyond the largest value.
-const SPACINGS: u32 = 8;
+const SPACINGS: u8 = 12;
 
 /// Display codes per relative error at white: `255 * 1.055 / 2.4`.
 const CODES_PER_RATIO: f32 = 112.093_75;
@@ -40,8 +41,11 @@ const PRIMARIES: [Rgb; 3] = [
     Rgb::new(0.0, 0.0, 1.0),
 ];
 
-/// Bearable display errors of a light alone in white, and in a primary.
-const BEARABLE: [f32; 2] = [2.0, 3.0];
+/// Values that were bad on a curve before, and are looked at first.
+const KNOWN: usize = 4;
+
+/// Bearable display errors of a light alone in white, in a primary, and above white.
+const BEARABLE: [f32; 3] = [2.0, 3.0, 2.5];
 
 /// The lights with their curves; `values` element by element, a packing per light.
 pub(super) fn entries<'a>(
@@ -165,34 +169,85 @@ fn display_curve(mut values: Vec<f32>, own_white: f32, luminance: f32) -> Option
     let step = (values.len() / SAMPLES).max(1);
     let by_rank = values.iter().step_by(step);
     let top = values.iter().rev().take(SAMPLES);
-    let samples: Vec<f32> = by_rank.chain(top).copied().collect();
+    let mut samples: Vec<Sample> = by_rank
+        .chain(top)
+        .map(|value| Sample::new(*value, own_white, channel_white))
+        .collect();
 
-    let cost = |curve: &Curve| {
-        let worst = |value: f32| {
-            let found = curve.decode(curve.encode(value, LAST));
-            let shown = |value: f32, white: f32| display_code(value / white).min(255.0);
-            let alone = |white: f32| (shown(found, white) - shown(value, white)).abs();
-            let above = if value > own_white {
-                CODES_PER_RATIO * (found / value - 1.0).abs()
-            } else {
-                0.0
-            };
-            let [in_white, in_primary] = BEARABLE;
-            (alone(own_white).max(above) / in_white).max(alone(channel_white) / in_primary)
-        };
-        samples.iter().copied().map(worst).fold(0.0, f32::max)
-    };
-    let candidates = (0..WHITES).flat_map(|halvings| {
-        let white = scale_or_one(own_white * 0.5_f32.powf(0.5 * halvings as f32));
+    let mut best = (f32::INFINITY, None);
+    for part in 0..WHITES {
+        let white = scale_or_one(own_white * 2.0_f32.powf(-0.25 * part as f32));
         let code = |value: f32| display_code(value / white.value());
         let level = (code(largest) - code(smallest)) / f32::from(LAST);
-        (0..SPACINGS).filter_map(move |quarters| {
-            let beyond = (level * quarters as f32 / 4.0 / CODES_PER_RATIO).exp();
-            Curve::display_between(white, smallest, largest * beyond, LAST)
-        })
-    });
-    candidates
-        .map(|curve| (cost(&curve), curve))
-        .min_by(|(a, _), (b, _)| a.total_cmp(b))
-        .map(|(_, curve)| curve)
+        for parts in 0..SPACINGS {
+            let beyond = (level * parts as f32 / 4.0 / CODES_PER_RATIO).exp();
+            let Some(curve) = Curve::display_between(white, smallest, largest * beyond, LAST)
+            else {
+                continue;
+            };
+            // What was bad on one curve is looked at first on the next, mostly in vain for the curve.
+            let nearest = |value: f32| curve.decode(curve.encode(value, LAST));
+            let known = samples.iter().take(KNOWN);
+            if known.clone().any(|s| s.cost(nearest(s.value)) >= best.0) {
+                continue;
+            }
+            let levels: Vec<f32> = (0..=LAST).map(|code| curve.decode(code)).collect();
+            let mut cost = 0.0_f32;
+            let bad = samples.iter().position(|sample| {
+                cost = cost.max(sample.cost(sample.nearest(&levels)));
+                cost >= best.0
+            });
+            match bad {
+                Some(bad) => samples[..=bad].rotate_right(1),
+                None => best = (cost, Some(curve)),
+            }
+        }
+    }
+    best.1
+}
+
+/// A value on which curves are judged.
+struct Sample {
+    value: f32,
+    own_white: f32,
+    channel_white: f32,
+    /// Its display codes with the light alone, and with its channel alone.
+    shown: [f32; 2],
+    /// Whether it is above white.
+    is_above: bool,
+}
+
+impl Sample {
+    fn new(value: f32, own_white: f32, channel_white: f32) -> Self {
+        Self {
+            value,
+            own_white,
+            channel_white,
+            shown: [own_white, channel_white].map(|white| shown_code(value / white)),
+            is_above: value > own_white,
+        }
+    }
+
+    /// The nearest of some levels, which rise.
+    fn nearest(&self, levels: &[f32]) -> f32 {
+        let above = levels.partition_point(|level| *level < self.value);
+        let near = &levels[above.saturating_sub(1)..levels.len().min(above + 1)];
+        let distance = |level: &f32| (level - self.value).abs();
+        let nearest = near.iter().copied();
+        let nearest = nearest.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        nearest.unwrap_or(0.0)
+    }
+
+    /// The largest of its errors over what is bearable, where `found` takes its place.
+    fn cost(&self, found: f32) -> f32 {
+        let [in_white, in_primary, ratio] = BEARABLE;
+        let above = if self.is_above {
+            CODES_PER_RATIO * (found / self.value - 1.0).abs()
+        } else {
+            0.0
+        };
+        let alone = (shown_code(found / self.own_white) - self.shown[0]).abs();
+        let primary = (shown_code(found / self.channel_white) - self.shown[1]).abs();
+        (alone / in_white).max(primary / in_primary).max(above / ratio)
+    }
 }
