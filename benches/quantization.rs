@@ -52,17 +52,17 @@ fn bake(scene: &OwnedScene) -> Solution {
 
 fn print_table(solutions: &[Solution]) {
     eprintln!("error in display codes");
-    eprintln!("lights  code    codes (bytes)  largest  alone  shown  worst state");
+    eprintln!("lights  code       codes (bytes)  largest  alone  shown  worst state");
     for solution in solutions {
         for code in Code::ALL {
             let bytes = packed(solution, code);
             let atlas = Atlas::parse(&bytes).expect("bytes just written");
             let error = packing_error(solution, &atlas).expect("its own solution");
             eprintln!(
-                "{:>6}  {:<6}  {:>13}  {:>7.2}  {:>5.2}  {:>5.2}  {}",
+                "{:>6}  {:<9}  {:>13}  {:>7.2}  {:>5.2}  {:>5.2}  {}",
                 solution.lights.len(),
                 code.name(),
-                atlas.all_codes().len(),
+                atlas.code_bytes(),
                 error.codes,
                 median_alone(&error),
                 error.codes_shown,

@@ -62,7 +62,7 @@ fn of_atlas(atlas: &Atlas, bytes: usize) -> Value {
         json!({
             "name": light.name,
             "emission": light.emission.to_array(),
-            "scale": light.scale.value(),
+            "code": light.code.name(),
             "max_error_codes": light.error,
         })
     });
@@ -74,8 +74,6 @@ fn of_atlas(atlas: &Atlas, bytes: usize) -> Value {
     json!({
         "kind": "atlas",
         "bytes": bytes,
-        "code": atlas.code().name(),
-        "channels": atlas.channels().count(),
         "quantity": match atlas.quantity() {
             Quantity::Irradiance => "irradiance",
             Quantity::Radiosity => "radiosity",
@@ -84,7 +82,7 @@ fn of_atlas(atlas: &Atlas, bytes: usize) -> Value {
         "faces": atlas.mesh().map_or(0, |mesh| mesh.face_count()),
         "max_error_codes": worst.map(|worst| worst.packed),
         "codes_shown": worst.map(|worst| worst.shown),
-        "code_bytes": atlas.all_codes().len(),
+        "code_bytes": atlas.code_bytes(),
         "flash": bytes,
         "ram": n * 12 + k * 6,
         "multiply_adds_per_frame": n * k * 3,

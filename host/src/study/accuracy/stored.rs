@@ -1,7 +1,7 @@
 //! A result as it is stored: floats, half floats, 8-bit codes.
 
 use half::f16;
-use relume::atlas::{Atlas, Channels, Quantity};
+use relume::atlas::{Atlas, Quantity};
 use relume::code::Code;
 use relume::color::Rgb;
 
@@ -61,8 +61,7 @@ impl Storage {
             Self::F16 => as_f16(&solution.contributions, solution.lights.len()),
             Self::Exp8s => {
                 let format = Format {
-                    code: Code::Exp8s,
-                    channels: Channels::Rgb,
+                    packing: Code::Exp8s.into(),
                     quantity: Quantity::Irradiance,
                     mesh: false,
                 };
