@@ -1,4 +1,4 @@
-//! `relume study paper`: writes a table for each of the papers' tables.
+//! `relume study paper`: writes a table for each of the papers' tables, and two charts.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use anyhow::Result;
 use serde_json::{Map, Value, json};
 
 use super::table::Table;
-use crate::cli::tell;
+use crate::cli::{tell, write_file};
 use crate::study::paper::early::{FirstLook, Stored};
 use crate::study::paper::job::Errors;
 use crate::study::paper::{self, Report, large};
@@ -27,6 +27,9 @@ pub fn run(folder: &Path) -> Result<Value> {
     for (title, table) in tables(&report) {
         tell!("\n{title}\n{}", table.aligned());
         table.write(folder)?;
+    }
+    for (name, chart) in report.charts() {
+        write_file(&folder.join(name), chart.svg()?.as_bytes())?;
     }
     Ok(json(&report))
 }

@@ -20,6 +20,7 @@ use std::path::Path;
 use anyhow::Result;
 use rayon::ThreadPoolBuilder;
 
+use crate::chart::Chart;
 use cached::{Cached, Rows};
 use early::{FirstLook, Stored};
 use faces::Faces;
@@ -55,6 +56,17 @@ pub struct Report {
     pub large: Vec<Large>,
     /// The table of the spotlight paper.
     pub faces: Vec<Faces>,
+}
+
+impl Report {
+    /// Charts of the two papers' tables of times, with the names of their files.
+    #[must_use]
+    pub fn charts(&self) -> [(&'static str, Chart); 2] {
+        [
+            ("sampling.svg", sampling::chart(&self.sampling)),
+            ("faces.svg", faces::chart(&self.faces)),
+        ]
+    }
 }
 
 /// Runs the study; `data` is the folder with `scenes` and `truth`, `watch` is told what comes next.
