@@ -126,7 +126,9 @@ fn draft(solution: &Solution) -> Option<(Vec<usize>, Solution)> {
     let mut mesh = solution.mesh.clone();
     for face in &mut mesh.faces {
         face.emission = face.emission.and_then(|mut emission| {
-            let tag = tags.iter().position(|tag| *tag == emission.light as usize)?;
+            let tag = tags
+                .iter()
+                .position(|tag| *tag == emission.light as usize)?;
             emission.light = tag as u32;
             Some(emission)
         });
@@ -136,7 +138,10 @@ fn draft(solution: &Solution) -> Option<(Vec<usize>, Solution)> {
         surfaces: Vec::new(),
         luminaires: Vec::new(),
         mesh,
-        lights: tags.iter().map(|tag| solution.lights[*tag].clone()).collect(),
+        lights: tags
+            .iter()
+            .map(|tag| solution.lights[*tag].clone())
+            .collect(),
         contributions: elements
             .flat_map(|values| tags.iter().map(|tag| values[*tag]))
             .collect(),
@@ -356,11 +361,7 @@ fn most_exact(full: &Search, draft: &Search, budget: usize) -> Result<Choice, Pa
 }
 
 /// Most steps of an octave that a budget allows; `None` when a single one takes more.
-fn finest_within(
-    full: &Search,
-    white: f32,
-    budget: usize,
-) -> Result<Option<u16>, PackError> {
+fn finest_within(full: &Search, white: f32, budget: usize) -> Result<Option<u16>, PackError> {
     let fits = |steps: u16| -> Result<bool, PackError> {
         let tried = full.attempt(tiles(white, steps))?;
         Ok(tried.is_some_and(|tried| tried.candidate.bytes <= budget))
