@@ -11,7 +11,7 @@
 //! Files hold sRGB (IEC 61966-2-1); it is decoded before anything is averaged.
 
 use std::io::Cursor;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use glam::{Vec2, Vec3};
 use image::error::{LimitError, LimitErrorKind};
@@ -64,8 +64,7 @@ impl Image {
         }
         let encoded = DynamicImage::from_decoder(decoder)?.into_rgb16();
 
-        let linear: Vec<f32> = (0..=u16::MAX).map(linear_from_srgb).collect();
-        let decode = |code: u16| linear.get(usize::from(code)).copied().unwrap_or_default();
+        let decode = |code: u16| LINEAR.get(usize::from(code)).copied().unwrap_or_default();
         Ok(Self {
             width: encoded.width() as usize,
             height: encoded.height() as usize,
@@ -94,6 +93,10 @@ impl Image {
         texel.copied().unwrap_or_default()
     }
 }
+
+/// The linear light of every code.
+static LINEAR: LazyLock<Vec<f32>> =
+    LazyLock::new(|| (0..=u16::MAX).map(linear_from_srgb).collect());
 
 /// The sRGB transfer function, from code to linear light.
 fn linear_from_srgb(code: u16) -> f32 {

@@ -2,10 +2,9 @@
 
 use relume::atlas::{Atlas, Quantity, WorstError};
 use relume::color::Rgb;
-use relume::relight::RelightError;
 
 use super::unpack::contributions;
-use super::{packed_values, relight_atlas};
+use super::{PackError, packed_values, relight_atlas};
 use crate::display_error::{max_codes, test_mixes};
 use crate::solution::Solution;
 
@@ -35,8 +34,9 @@ impl PackingError {
 /// Compares an atlas with the solution that it was packed from, over the mixes of [`test_mixes`].
 ///
 /// # Errors
-/// [`RelightError`] when the atlas belongs to another solution.
-pub fn packing_error(solution: &Solution, atlas: &Atlas) -> Result<PackingError, RelightError> {
+/// [`PackError::Relight`] when the atlas belongs to another solution, [`PackError::TooLarge`] when memory does not
+/// hold it twice.
+pub fn packing_error(solution: &Solution, atlas: &Atlas) -> Result<PackingError, PackError> {
     let names: Vec<&str> = solution.lights.iter().map(|l| l.name.as_str()).collect();
     let values = packed_values(solution, atlas.quantity());
     let lights = solution.lights.len();
@@ -46,7 +46,7 @@ pub fn packing_error(solution: &Solution, atlas: &Atlas) -> Result<PackingError,
         codes_shown: 0.0,
         per_light: Vec::new(),
     };
-    let decoded = contributions(atlas);
+    let decoded = contributions(atlas)?;
     let mut all = vec![Rgb::BLACK; lights];
     for (state, number) in test_mixes(&solution.nominal_mix(), &names)
         .into_iter()

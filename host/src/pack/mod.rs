@@ -14,7 +14,7 @@ use thiserror::Error;
 use crate::solution::Solution;
 
 pub use measure::{PackingError, packing_error};
-pub use unpack::{contributions, unpack};
+pub use unpack::{TooLarge, contributions, unpack};
 
 /// How a light is packed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,6 +61,9 @@ pub enum PackError {
     /// A state of the lights cannot be relit.
     #[error(transparent)]
     Relight(#[from] RelightError),
+    /// What was packed cannot be measured.
+    #[error(transparent)]
+    TooLarge(#[from] TooLarge),
 }
 
 /// Packs a solution; the atlas states what that cost.

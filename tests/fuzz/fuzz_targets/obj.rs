@@ -15,7 +15,9 @@ fuzz_target!(|bytes: &[u8]| {
     };
     let image = include_bytes!("../seeds/texture/rgb.png");
     let folder = placed(&[("s.obj", scene), ("s.mtl", materials), ("t.png", image)]);
-    match within((1 << 20) + 1024 * bytes.len(), || load(&folder.join("s.obj"), None)) {
+    match within((1 << 20) + 1024 * bytes.len(), || {
+        load(&folder.join("s.obj"), None)
+    }) {
         Ok(imported) => assert!(imported.scene.view().is_ok()),
         Err(error) => assert!(!error.to_string().contains('\n'), "{error}"),
     }

@@ -2,8 +2,9 @@
 
 use std::alloc::System;
 use std::fs;
+use std::panic;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::{Once, OnceLock};
 
 use cap::Cap;
 use crc::{CRC_32_ISO_HDLC, Crc};
@@ -17,6 +18,14 @@ const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 ///
 /// An allocation beyond that fails, which ends the process: a crash for the fuzzer.
 pub fn within<T>(bytes: usize, work: impl FnOnce() -> T) -> T {
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let report = panic::take_hook();
+        panic::set_hook(Box::new(move |panic| {
+            limit(usize::MAX); // a report needs memory of its own
+            report(panic);
+        }));
+    });
     limit(HEAP.allocated().saturating_add(bytes));
     let result = work();
     limit(usize::MAX);
