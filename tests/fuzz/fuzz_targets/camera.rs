@@ -6,7 +6,7 @@ use relume_fuzz::within;
 use relume_host::preview::{Camera, Viewpoint};
 
 fuzz_target!(|text: &str| {
-    let camera = within(1 << 16 | 256 * text.len(), || {
+    let camera = within((1 << 16) + 1024 * text.len(), || {
         Camera::new(Viewpoint::from_toml(text)?, 64, 48)
     });
     match camera {
