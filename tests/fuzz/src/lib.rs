@@ -1,4 +1,7 @@
 //! What the fuzz targets share: a limit on memory, checksums that match, a folder for files.
+//!
+//! A reader has a file in `fuzz_targets/` with its `[[bin]]`, a folder in `seeds/` with at least one file that it
+//! takes, perhaps a dictionary of the same name in `dict/`, and a line in `coverage`.
 
 use std::alloc::System;
 use std::fs;
