@@ -40,7 +40,7 @@ pub fn load(path: &Path) -> Result<Loaded> {
     }
     let atlas = Atlas::parse(&bytes).with_context(|| path.display().to_string())?;
     Ok(Loaded::Atlas {
-        solution: unpack(&atlas),
+        solution: unpack(&atlas).with_context(|| path.display().to_string())?,
         quantity: atlas.quantity(),
         bytes,
     })

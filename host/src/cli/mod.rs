@@ -20,6 +20,8 @@ use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
 use serde_json::Value;
 
+pub use form_factor::{Case, read_cases};
+
 use crate::file::write_whole;
 
 /// Radiosity relighting: bake a scene once with every light kept apart, then dim, switch and

@@ -19,7 +19,7 @@ use crate::solution::Solution;
 
 pub use choose::{Aim, Candidate, Choice, Judged, Request, choose};
 pub use measure::PackingError;
-pub use unpack::{contributions, unpack};
+pub use unpack::{TooLarge, contributions, unpack};
 
 /// How a light is packed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -104,6 +104,12 @@ pub enum PackError {
         /// What it takes.
         bytes: usize,
     },
+    /// A state of the lights cannot be relit.
+    #[error(transparent)]
+    Relight(#[from] RelightError),
+    /// What was packed cannot be measured.
+    #[error(transparent)]
+    TooLarge(#[from] TooLarge),
 }
 
 /// Packs a solution; the atlas states what that cost.
@@ -146,19 +152,20 @@ pub fn pack_lights(
 /// Compares an atlas with the solution that it was packed from.
 ///
 /// # Errors
-/// [`RelightError`] when the atlas belongs to another solution.
-pub fn packing_error(solution: &Solution, atlas: &Atlas) -> Result<PackingError, RelightError> {
+/// [`PackError::Relight`] when the atlas belongs to another solution, [`PackError::TooLarge`] when memory does not
+/// hold it twice.
+pub fn packing_error(solution: &Solution, atlas: &Atlas) -> Result<PackingError, PackError> {
     let (elements, lights) = (solution.mesh.elements.len(), solution.lights.len());
     if atlas.element_count() as usize != elements {
         let expected = elements as u32;
-        return Err(RelightError::Elements { expected });
+        return Err(RelightError::Elements { expected }.into());
     }
     if atlas.light_count() as usize != lights {
         let expected = lights as u32;
-        return Err(RelightError::Lights { expected });
+        return Err(RelightError::Lights { expected }.into());
     }
     let source = Source::new(solution, atlas.quantity());
-    let decoded = contributions(atlas);
+    let decoded = contributions(atlas)?;
     Ok(measure::measure(&source, &decoded, f32::INFINITY))
 }
 
@@ -242,8 +249,8 @@ impl<'a> Packed<'a> {
     }
 
     /// What a reader makes of it.
-    fn decoded(&self) -> Result<Vec<Rgb>, AtlasError> {
-        Ok(contributions(&Atlas::parse(&self.write(false, None)?)?))
+    fn decoded(&self) -> Result<Vec<Rgb>, PackError> {
+        Ok(contributions(&Atlas::parse(&self.write(false, None)?)?)?)
     }
 }
 

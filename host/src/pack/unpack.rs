@@ -5,31 +5,59 @@ use relume::color::Rgb;
 use relume::geometry::Polygon;
 use relume::mesh::{Element, Face, Patch, Spacing};
 use relume::relight::{DecodeTable, table_length};
+use thiserror::Error;
 
 use crate::mesh::OwnedMesh;
 use crate::solution::{Method, Solution, SolutionLight};
 
+/// An atlas is larger than memory once it is unpacked: dark tiles take next to no bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error("{elements} elements times {lights} lights are more than memory holds; pack fewer of them")]
+pub struct TooLarge {
+    /// How many elements the atlas has.
+    pub elements: u32,
+    /// How many lights it has.
+    pub lights: u32,
+}
+
 /// All contributions, element by element, light by light.
-#[must_use]
-pub fn contributions(atlas: &Atlas) -> Vec<Rgb> {
+///
+/// # Errors
+/// [`TooLarge`].
+pub fn contributions(atlas: &Atlas) -> Result<Vec<Rgb>, TooLarge> {
     let lights = atlas.light_count() as usize;
-    let mut values = vec![0.0; table_length(atlas)];
-    let mut contributions = vec![Rgb::BLACK; atlas.element_count() as usize * lights];
-    let Ok(table) = DecodeTable::new(atlas, &mut values) else {
-        return contributions;
+    let too_large = TooLarge {
+        elements: atlas.element_count(),
+        lights: atlas.light_count(),
     };
+    let count = lights.checked_mul(atlas.element_count() as usize);
+    let contributions = count.and_then(|count| filled(count, Rgb::BLACK));
+    let mut contributions = contributions.ok_or(too_large)?;
+    let mut values = filled(table_length(atlas), 0.0).ok_or(too_large)?;
+    let table = DecodeTable::new(atlas, &mut values).map_err(|_| too_large)?;
     atlas.for_each(|element, light, codes| {
         contributions[element as usize * lights + light as usize] = table.decode(light, codes);
     });
-    contributions
+    Ok(contributions)
+}
+
+/// So many copies of a value; `None` when there is no memory for them.
+fn filled<T: Copy>(count: usize, value: T) -> Option<Vec<T>> {
+    let mut values = Vec::new();
+    values.try_reserve_exact(count).ok()?;
+    values.resize(count, value);
+    Some(values)
 }
 
 /// The solution that an atlas still holds: decoded contributions and, if it carries one, the mesh,
 /// with one patch per face.
-#[must_use]
-pub fn unpack(atlas: &Atlas) -> Solution {
+///
+/// # Errors
+/// [`TooLarge`].
+pub fn unpack(atlas: &Atlas) -> Result<Solution, TooLarge> {
+    let contributions = contributions(atlas)?;
     let (surfaces, mesh) = unpack_mesh(atlas);
-    Solution {
+    Ok(Solution {
         surfaces,
         luminaires: Vec::new(),
         mesh,
@@ -42,7 +70,7 @@ pub fn unpack(atlas: &Atlas) -> Solution {
                 error: f32::NAN,
             })
             .collect(),
-        contributions: contributions(atlas),
+        contributions,
         direct: None,
         method: Method::default(),
         rows: 0,
@@ -50,7 +78,7 @@ pub fn unpack(atlas: &Atlas) -> Solution {
             patch: f32::NAN,
             element: f32::NAN,
         },
-    }
+    })
 }
 
 fn unpack_mesh(atlas: &Atlas) -> (Vec<Polygon>, OwnedMesh) {
@@ -98,4 +126,44 @@ fn unpack_mesh(atlas: &Atlas) -> (Vec<Polygon>, OwnedMesh) {
         });
     }
     (surfaces.collect(), mesh)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use relume::atlas::{Contents, LightEntry, Quantity, size, write};
+    use relume::code::{Code, Curve, Scale};
+
+    /// A grid of 1024 x 1024 dark elements: 4096 tiles, all of which begin where the bits end.
+    #[test]
+    fn an_atlas_that_memory_cannot_hold_is_refused() {
+        let side = 1024_u16.to_le_bytes();
+        let mut tiles = vec![16, 4, 0, 0, 1, 0, 0, 0, 0, 16, 0, 0];
+        tiles.extend(side.into_iter().chain(side));
+        tiles.extend([0; 4 * 4096]);
+        let light = LightEntry {
+            name: "",
+            emission: Rgb::WHITE,
+            code: Code::Tiles,
+            curves: [Curve::display(Scale::ONE, 1.0).unwrap(); 3],
+            last: [255; 3],
+        };
+        let with = |lights: usize| {
+            let contents = Contents {
+                quantity: Quantity::Irradiance,
+                lights: &vec![light; lights],
+                elements: 1 << 20,
+                errors: None,
+                tiles: &tiles,
+                mesh: None,
+            };
+            let mut bytes = vec![0; size(&contents).unwrap()];
+            write(&contents, |_, _| Rgb::BLACK, &mut bytes).unwrap();
+            contributions(&Atlas::parse(&bytes).unwrap())
+        };
+        assert_eq!(with(1), Ok(vec![Rgb::BLACK; 1 << 20]));
+        let (elements, lights) = (1 << 20, 1 << 20);
+        let refused = with(lights as usize).unwrap_err();
+        assert_eq!(refused, TooLarge { elements, lights });
+    }
 }

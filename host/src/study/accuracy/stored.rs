@@ -7,7 +7,7 @@ use relume::color::Rgb;
 
 use super::AccuracyError;
 use super::ways::Way;
-use crate::pack::{Format, pack, unpack};
+use crate::pack::{Format, PackError, contributions, pack};
 use crate::solution::Solution;
 
 /// How a result is stored.
@@ -65,7 +65,7 @@ impl Storage {
                     quantity: Quantity::Irradiance,
                     mesh: false,
                 };
-                unpack(&Atlas::parse(&pack(solution, format)?)?).contributions
+                contributions(&Atlas::parse(&pack(solution, format)?)?).map_err(PackError::from)?
             }
         })
     }
