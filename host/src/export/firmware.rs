@@ -214,6 +214,7 @@ mod tests {
             quantity: Quantity::Irradiance,
             lights: &[light("desk lamp"), light("desk-lamp"), light("3")],
             elements: 2,
+            image_width: 0,
             errors: None,
             tiles: &[],
             mesh: None,

@@ -127,6 +127,7 @@ impl<'a> Packed<'a> {
             quantity: self.quantity,
             lights: &self.entries,
             elements: solution.mesh.elements.len() as u32,
+            image_width: 0,
             errors: error.map(|error| (error.worst(), &error.per_light[..])),
             tiles: &self.tiles,
             mesh: with_mesh.then(|| (&solution.surfaces[..], solution.mesh.view())),
