@@ -128,6 +128,7 @@ fn atlas_bytes(elements: u32, lights: u32, code: Code) -> Vec<u8> {
         quantity: Quantity::Irradiance,
         lights: &vec![entry; lights as usize],
         elements,
+        image_width: 0,
         errors: None,
         tiles: &[],
         mesh: None,

@@ -86,6 +86,7 @@ fn bake_and_pack(flash: &mut [u8]) -> usize {
         quantity: Quantity::Irradiance,
         lights: &lights,
         elements: ELEMENTS as u32,
+        image_width: 0,
         errors: None,
         tiles: &[],
         mesh: Some((&outlines, mesh)),

@@ -1,3 +1,4 @@
 //! Files for other programs.
 
 pub mod exr;
+pub mod firmware;

@@ -225,6 +225,7 @@ impl<'a> Packed<'a> {
             quantity: self.source.quantity,
             lights: &self.entries,
             elements: solution.mesh.elements.len() as u32,
+            image_width: 0,
             errors,
             tiles: &self.tiles,
             mesh: with_mesh.then(|| (&solution.surfaces[..], solution.mesh.view())),

@@ -153,6 +153,7 @@ mod tests {
                 quantity: Quantity::Irradiance,
                 lights: &vec![light; lights],
                 elements: 1 << 20,
+                image_width: 0,
                 errors: None,
                 tiles: &tiles,
                 mesh: None,

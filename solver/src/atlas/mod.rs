@@ -6,8 +6,9 @@
 //! | --- | --- |
 //! | 0 | `RELUMEAT` |
 //! | 8 | `u16` version, 2 |
-//! | 10 | `u8` quantity: 0 irradiance, 1 radiosity (reflectance multiplied in) |
-//! | 11 | five zero bytes |
+//! | 10 | `u8` quantity: 0 irradiance, 1 radiosity (reflectance multiplied in), 2 radiance |
+//! | 11 | three zero bytes |
+//! | 14 | `u16` width of the image whose pixels, row by row, are the elements; 0 for an atlas of no image |
 //! | 16 | `u32` length of the whole atlas |
 //! | 20 | `u32` CRC-32 (ISO-HDLC) of all bytes but these four |
 //! | 24 | `u32` elements `n` |
@@ -79,6 +80,8 @@ pub enum Quantity {
     Irradiance,
     /// Radiosity without emission, W/m2: the reflectance is multiplied in.
     Radiosity,
+    /// Radiance towards a camera, in the unit of the picture that it came from: the elements are pixels.
+    Radiance,
 }
 
 /// The largest errors of packing over all states of the lights that were tried.

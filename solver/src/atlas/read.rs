@@ -18,6 +18,7 @@ use crate::scene::Emission;
 #[derive(Clone, Copy, Debug)]
 pub struct Atlas<'a> {
     quantity: Quantity,
+    image_width: u16,
     counts: CountsOf,
     worst_error: Option<WorstError>,
     lights: &'a [u8],
@@ -67,12 +68,19 @@ impl<'a> Atlas<'a> {
         let part = |from: u64, to: u64| bytes.get(from as usize..to as usize).unwrap_or_default();
         let names = core::str::from_utf8(part(needed.names, needed.codes));
         let tiles = part(needed.tiles, needed.surfaces);
+        let is_image = header.image_width > 0;
+        if is_image
+            && (counts.faces > 0 || !counts.elements.is_multiple_of(header.image_width.into()))
+        {
+            return Err(AtlasError::Illegal("image width"));
+        }
         if tiles.is_empty() == is_tiled {
             return Err(AtlasError::Illegal("table of tiles"));
         }
         let tiles = is_tiled.then(|| Tiles::parse(tiles, counts.elements));
         let atlas = Self {
             quantity: header.quantity,
+            image_width: header.image_width,
             counts,
             worst_error: header.worst_error,
             lights,
@@ -118,6 +126,13 @@ impl<'a> Atlas<'a> {
     #[must_use]
     pub const fn quantity(&self) -> Quantity {
         self.quantity
+    }
+
+    /// Width and height of the image whose pixels, row by row from the top, are the elements.
+    #[must_use]
+    pub fn image_size(&self) -> Option<[u32; 2]> {
+        let width = u32::from(self.image_width);
+        Some([width, self.counts.elements.checked_div(width)?])
     }
 
     /// What packing cost, over all states that were tried; `None` when nobody measured it.
@@ -374,6 +389,7 @@ impl AtlasMesh<'_> {
 
 struct Header {
     quantity: Quantity,
+    image_width: u16,
     length: u32,
     checksum: u32,
     counts: CountsOf,
@@ -393,10 +409,11 @@ impl Header {
         if version != VERSION {
             return Err(AtlasError::Version(version));
         }
-        let [quantity, reserved @ ..] = input.take::<6>().ok_or(short)?;
-        if reserved != [0; 5] {
+        let [quantity, reserved @ ..] = input.take::<4>().ok_or(short)?;
+        if reserved != [0; 3] {
             return Err(AtlasError::Illegal("reserved byte"));
         }
+        let image_width = input.u16().ok_or(short)?;
         debug_assert_eq!(CHECKSUM_AT, 20);
         let words = input.take::<{ HEADER_BYTES - 16 }>().ok_or(short)?;
         let (words, _) = words.as_chunks::<4>();
@@ -406,8 +423,10 @@ impl Header {
             quantity: match quantity {
                 0 => Quantity::Irradiance,
                 1 => Quantity::Radiosity,
+                2 => Quantity::Radiance,
                 _ => return Err(AtlasError::Illegal("quantity")),
             },
+            image_width,
             length: next()?,
             checksum: next()?,
             counts: CountsOf {

@@ -106,6 +106,7 @@ fn sample() -> Vec<u8> {
         quantity: Quantity::Irradiance,
         lights: &lights,
         elements: 8,
+        image_width: 0,
         errors: Some((WORST, &[0.5, 2.5, 1.0, 3.5])),
         tiles: &TILES,
         mesh: Some((&surfaces.map(|s| *s.polygon()), mesh)),
@@ -228,9 +229,10 @@ fn what_the_format_does_not_allow_is_an_error() {
     let nan = f32::NAN.to_le_bytes();
     let minus = (-1.0_f32).to_le_bytes();
     for (at, bytes, what) in [
-        (10, &[2][..], "quantity"),
+        (10, &[3][..], "quantity"),
         (11, &[1], "reserved byte"),
-        (15, &[1], "reserved byte"),
+        (13, &[1], "reserved byte"),
+        (14, &[4], "image width"),
         (16, &[0], "length"),
         (48, &nan, "error"),
         (48, &minus, "error"),
@@ -322,6 +324,7 @@ fn an_atlas_without_a_mesh_has_none() {
             Scale::ONE,
         )],
         elements: 3,
+        image_width: 0,
         errors: None,
         tiles: &[],
         mesh: None,

@@ -47,6 +47,8 @@ pub struct Contents<'a> {
     pub lights: &'a [LightEntry<'a>],
     /// How many elements there are.
     pub elements: u32,
+    /// Width of the image whose pixels, row by row from the top, are the elements; 0 without one.
+    pub image_width: u16,
     /// What packing cost: the worst, and that of every light alone (see
     /// [`AtlasLight::error`](super::AtlasLight::error)); `None` when nobody measured it.
     pub errors: Option<(WorstError, &'a [f32])>,
@@ -67,6 +69,10 @@ impl Contents<'_> {
             && mesh.elements.len() != self.elements as usize
         {
             return Err(AtlasError::Unfit("another mesh than that of its elements"));
+        }
+        let width = u32::from(self.image_width);
+        if width > 0 && (self.mesh.is_some() || !self.elements.is_multiple_of(width)) {
+            return Err(AtlasError::Unfit("an image with a mesh, or of rows that are not full"));
         }
         if self
             .errors
@@ -158,13 +164,13 @@ fn header(contents: &Contents, length: usize, output: &mut Output) -> Result<(),
         match contents.quantity {
             Quantity::Irradiance => 0,
             Quantity::Radiosity => 1,
+            Quantity::Radiance => 2,
         },
         0,
         0,
         0,
-        0,
-        0,
     ])?;
+    output.put(&contents.image_width.to_le_bytes())?;
     let worst = contents.errors.map(|(worst, _)| worst);
     // `size` has checked that the length fits; the checksum is filled in at the end.
     let rest = [

@@ -49,6 +49,7 @@ fn atlas() -> Vec<u8> {
             Scale::ONE,
         )],
         elements: 2,
+        image_width: 0,
         errors: None,
         tiles: &[],
         mesh: Some((&surfaces.map(|s| *s.polygon()), storage.mesh())),

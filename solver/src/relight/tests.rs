@@ -44,6 +44,7 @@ fn atlas_bytes(lights: u32) -> Vec<u8> {
         quantity: Quantity::Irradiance,
         lights: &entries,
         elements: ELEMENTS,
+        image_width: 0,
         errors: None,
         tiles: &[],
         mesh: None,
