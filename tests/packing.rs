@@ -52,6 +52,7 @@ fn first(solution: &Solution, lights: usize) -> Solution {
         surfaces: solution.surfaces.clone(),
         luminaires: Vec::new(),
         mesh,
+        image: None,
         lights: solution.lights[..lights].to_vec(),
         contributions: elements.flat_map(|v| v[..lights].iter().copied()).collect(),
         direct: None,
@@ -431,6 +432,7 @@ fn row(lights: usize, contributions: Vec<Rgb>) -> Solution {
         surfaces: vec![polygon],
         luminaires: Vec::new(),
         mesh,
+        image: None,
         lights: (0..lights).map(light).collect(),
         contributions,
         direct: None,
@@ -483,7 +485,7 @@ fn no_mix_breaks_the_bound_of_the_logarithmic_tiles() {
             let solution = row(lights, values);
             let (bytes, _) = packed(&solution, Code::TilesLog);
             let atlas = Atlas::parse(&bytes).expect("bytes just written");
-            let decoded = contributions(&atlas);
+            let decoded = contributions(&atlas).expect("it fits memory");
             for attack in 0..40_u64 {
                 let element = attack as usize % elements;
                 let here = element * lights..(element + 1) * lights;

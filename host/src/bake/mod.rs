@@ -390,6 +390,7 @@ fn solution(scene: &OwnedScene, method: Method, spacing: Spacing, solved: Solved
         surfaces: scene.surfaces.iter().map(|s| *s.polygon()).collect(),
         luminaires: scene.luminaires.clone(),
         mesh: mesh::placed(&solved.mesh, &scene.surfaces),
+        image: None,
         lights: lights
             .map(|((light, residual), error)| SolutionLight {
                 name: light.name.clone(),

@@ -31,6 +31,16 @@ pub fn run(arguments: &Arguments) -> Result<Outcome> {
 }
 
 fn of_solution(solution: &Solution) -> Value {
+    if let Some([width, height]) = solution.image {
+        let names = solution.lights.iter().map(|light| &light.name);
+        return json!({
+            "kind": "picture",
+            "width": width,
+            "height": height,
+            "lights": solution.lights.len(),
+            "names": names.collect::<Vec<_>>(),
+        });
+    }
     let lights = solution.lights.iter().map(|light| {
         json!({
             "name": light.name,
@@ -92,6 +102,7 @@ fn of_atlas(atlas: &Atlas, bytes: usize) -> Value {
         "quantity": match atlas.quantity() {
             Quantity::Irradiance => "irradiance",
             Quantity::Radiosity => "radiosity",
+            Quantity::Radiance => "radiance",
         },
         "elements": n,
         "faces": atlas.mesh().map_or(0, |mesh| mesh.face_count()),

@@ -7,12 +7,18 @@ use anyhow::{Context, Result, anyhow, bail};
 use relume::atlas::{Atlas, Quantity};
 use relume::color::Rgb;
 
+use super::tell;
+use crate::export::exr::read_light_layers;
+use crate::import::light_layers::contributions;
 use crate::pack::{relight_atlas, unpack};
 use crate::solution::{self, Solution};
 
+/// How an OpenEXR file starts.
+const EXR: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
+
 /// What a file holds.
 pub enum Loaded {
-    /// Contributions in `f32`.
+    /// Contributions in `f32`; those of a picture with a layer per light are radiances.
     Solution(Solution),
     /// Packed contributions, decoded, and the bytes that they came from.
     Atlas {
@@ -32,9 +38,19 @@ pub fn load(path: &Path) -> Result<Loaded> {
         let solution = solution::read(&bytes).with_context(|| path.display().to_string())?;
         return Ok(Loaded::Solution(solution));
     }
+    if bytes.starts_with(&EXR) {
+        let (solution, repaired) = contributions(&read_light_layers(path)?);
+        if repaired > 0 {
+            tell!(
+                "{}: {repaired} values were negative or not finite; they are dark now",
+                path.display()
+            );
+        }
+        return Ok(Loaded::Solution(solution));
+    }
     if !bytes.starts_with(&relume::atlas::MAGIC) {
         bail!(
-            "{}: neither a solution nor an atlas; make one with `relume bake` or `relume pack`",
+            "{}: no solution, atlas or OpenEXR picture with a layer per light; make one with `relume bake` or `relume pack`",
             path.display()
         );
     }

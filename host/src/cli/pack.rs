@@ -19,7 +19,7 @@ pub const MAX_ERROR: f32 = 1.0;
 
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// The solution
+    /// The solution, or an OpenEXR picture with a layer per light (*.Combined_NAME)
     input: PathBuf,
     /// Where the atlas goes; `-` is stdout [default: the input's name .atlas, here]
     #[arg(short, long, value_name = "FILE.atlas")]
@@ -33,9 +33,9 @@ pub struct Arguments {
     /// Choose the most exact packing whose atlas has at most so many bytes
     #[arg(long, value_name = "BYTES")]
     budget: Option<usize>,
-    /// What to pack
-    #[arg(long, value_enum, default_value_t = QuantityName::Irradiance)]
-    quantity: QuantityName,
+    /// What to pack of a solution [default: irradiance]
+    #[arg(long, value_enum)]
+    quantity: Option<QuantityName>,
     /// Leave out the mesh: smaller, but no drawing and no probing by place
     #[arg(long)]
     no_mesh: bool,
@@ -107,9 +107,11 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     let Loaded::Solution(solution) = load(&arguments.input)? else {
         bail!("{path}: this is an atlas already; give the solution that it was packed from");
     };
-    let quantity = match arguments.quantity {
-        QuantityName::Irradiance => Quantity::Irradiance,
-        QuantityName::Radiosity => Quantity::Radiosity,
+    let quantity = match (arguments.quantity, solution.image) {
+        (None, Some(_)) => Quantity::Radiance,
+        (Some(_), Some(_)) => bail!("{path}: a picture holds radiance only; leave out --quantity"),
+        (None | Some(QuantityName::Irradiance), None) => Quantity::Irradiance,
+        (Some(QuantityName::Radiosity), None) => Quantity::Radiosity,
     };
     let mesh = !arguments.no_mesh;
     let given = arguments.given(&solution).context(path.clone())?;

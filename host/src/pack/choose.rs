@@ -138,6 +138,7 @@ fn draft(solution: &Solution) -> Option<(Vec<usize>, Solution)> {
         surfaces: Vec::new(),
         luminaires: Vec::new(),
         mesh,
+        image: solution.image,
         lights: tags
             .iter()
             .map(|tag| solution.lights[*tag].clone())

@@ -170,7 +170,7 @@ fn display_curves(source: &Source, own: &[Rgb], emission: Rgb) -> [Option<Curve>
             .iter()
             .map(|e| e.reflectance)
             .collect(),
-        Quantity::Radiosity => vec![Rgb::WHITE; own.len()],
+        Quantity::Radiosity | Quantity::Radiance => vec![Rgb::WHITE; own.len()],
     };
     let whites = |weight: Rgb| {
         let lit = own.iter().map(|value| *value * weight);

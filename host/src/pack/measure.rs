@@ -195,6 +195,13 @@ fn judge(
     exact: impl Iterator<Item = Rgb> + Clone,
     found: impl Iterator<Item = Rgb> + Clone,
 ) -> WorstError {
+    if source.quantity == Quantity::Radiance {
+        let codes = max_codes_at(brightness, exact, found);
+        return WorstError {
+            packed: codes,
+            shown: codes,
+        };
+    }
     let mesh = &source.solution.mesh;
     let exitances: Vec<Rgb> = mesh
         .faces
@@ -208,7 +215,7 @@ fn judge(
     let shown = |value: Rgb, element: &relume::mesh::Element| {
         let reflected = match source.quantity {
             Quantity::Irradiance => element.reflectance * value,
-            Quantity::Radiosity => value,
+            Quantity::Radiosity | Quantity::Radiance => value,
         };
         exitances[mesh.patches[element.patch as usize].face as usize] + reflected
     };

@@ -155,7 +155,7 @@ pub fn pack_lights(
 /// [`PackError::Relight`] when the atlas belongs to another solution, [`PackError::TooLarge`] when memory does not
 /// hold it twice.
 pub fn packing_error(solution: &Solution, atlas: &Atlas) -> Result<PackingError, PackError> {
-    let (elements, lights) = (solution.mesh.elements.len(), solution.lights.len());
+    let (elements, lights) = (solution.element_count(), solution.lights.len());
     if atlas.element_count() as usize != elements {
         let expected = elements as u32;
         return Err(RelightError::Elements { expected }.into());
@@ -182,7 +182,7 @@ impl<'a> Source<'a> {
         let lights = solution.lights.len().max(1);
         let elements = solution.mesh.elements.iter();
         let values = match quantity {
-            Quantity::Irradiance => Cow::Borrowed(&solution.contributions[..]),
+            Quantity::Irradiance | Quantity::Radiance => Cow::Borrowed(&solution.contributions[..]),
             Quantity::Radiosity => elements
                 .zip(solution.contributions.chunks(lights))
                 .flat_map(|(element, values)| values.iter().map(|v| *v * element.reflectance))
@@ -207,7 +207,7 @@ impl<'a> Packed<'a> {
     /// Encodes a source, each light in a packing of its own.
     fn new(source: &'a Source, packings: &[Packing]) -> Result<Self, PackError> {
         let entries = curves::entries(source, packings)?;
-        let tiles = tiles::encode(&source.solution.mesh, &entries, &source.values);
+        let tiles = tiles::encode(source.solution, &entries, &source.values);
         Ok(Self {
             source,
             entries,
@@ -224,8 +224,9 @@ impl<'a> Packed<'a> {
         Contents {
             quantity: self.source.quantity,
             lights: &self.entries,
-            elements: solution.mesh.elements.len() as u32,
-            image_width: 0,
+            elements: solution.element_count() as u32,
+            // A picture that is read has no side above 16384.
+            image_width: solution.image.map_or(0, |[width, _]| width as u16),
             errors,
             tiles: &self.tiles,
             mesh: with_mesh.then(|| (&solution.surfaces[..], solution.mesh.view())),

@@ -8,12 +8,13 @@ use relume::color::Rgb;
 use relume::mesh::{Element, Face};
 
 use crate::mesh::OwnedMesh;
+use crate::solution::Solution;
 
 /// Sides that are tried; the smallest table wins.
 const SIDES: [u16; 5] = [4, 6, 8, 12, LARGEST_SIDE as u16];
 
 /// The table of tiles of all lights in tiles; empty without one. `values` element by element.
-pub(super) fn encode(mesh: &OwnedMesh, lights: &[LightEntry], values: &[Rgb]) -> Vec<u8> {
+pub(super) fn encode(solution: &Solution, lights: &[LightEntry], values: &[Rgb]) -> Vec<u8> {
     let tiled: Vec<(usize, &LightEntry)> = lights
         .iter()
         .enumerate()
@@ -26,7 +27,10 @@ pub(super) fn encode(mesh: &OwnedMesh, lights: &[LightEntry], values: &[Rgb]) ->
         .par_iter()
         .map(|(tag, light)| codes(light, values.iter().skip(*tag).step_by(lights.len())))
         .collect();
-    let grids = grids(mesh);
+    let grids = match solution.image {
+        Some([width, height]) => vec![[width as u16, height as u16]],
+        None => grids(&solution.mesh),
+    };
     let sides = SIDES.iter().map(|side| table(&grids, *side, &planes));
     sides.min_by_key(Vec::len).unwrap_or_default()
 }

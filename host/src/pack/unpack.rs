@@ -61,6 +61,7 @@ pub fn unpack(atlas: &Atlas) -> Result<Solution, TooLarge> {
         surfaces,
         luminaires: Vec::new(),
         mesh,
+        image: atlas.image_size(),
         lights: atlas
             .lights()
             .map(|light| SolutionLight {

@@ -72,7 +72,9 @@ impl Contents<'_> {
         }
         let width = u32::from(self.image_width);
         if width > 0 && (self.mesh.is_some() || !self.elements.is_multiple_of(width)) {
-            return Err(AtlasError::Unfit("an image with a mesh, or of rows that are not full"));
+            return Err(AtlasError::Unfit(
+                "an image with a mesh, or of rows that are not full",
+            ));
         }
         if self
             .errors
