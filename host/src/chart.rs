@@ -27,8 +27,8 @@ const LONG_AXIS: f64 = 4.0;
 /// Free space around the points, as a factor.
 const ROOM: f64 = 1.25;
 
-/// Colours that remain distinct for all kinds of sight (M. Okabe and K. Ito 2008).
-const PALETTE: [RGBColor; 8] = [
+/// Colours that remain distinct for all kinds of sight (M. Okabe and K. Ito 2008), and brown.
+const PALETTE: [RGBColor; 9] = [
     RGBColor(0, 0, 0),
     RGBColor(230, 159, 0),
     RGBColor(86, 180, 233),
@@ -37,6 +37,7 @@ const PALETTE: [RGBColor; 8] = [
     RGBColor(204, 121, 167),
     RGBColor(213, 94, 0),
     RGBColor(120, 94, 240),
+    RGBColor(125, 75, 35),
 ];
 
 const FONT: &str = "sans-serif";
