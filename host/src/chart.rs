@@ -30,8 +30,8 @@ const HEADROOM: u32 = 110;
 /// Width of a letter on an axis, px.
 const LETTER: u32 = 6;
 
-/// Colours that remain distinct for all kinds of sight (M. Okabe and K. Ito 2008).
-const PALETTE: [RGBColor; 8] = [
+/// Colours that remain distinct for all kinds of sight (M. Okabe and K. Ito 2008), and brown.
+const PALETTE: [RGBColor; 9] = [
     RGBColor(0, 0, 0),
     RGBColor(230, 159, 0),
     RGBColor(86, 180, 233),
@@ -40,6 +40,7 @@ const PALETTE: [RGBColor; 8] = [
     RGBColor(204, 121, 167),
     RGBColor(213, 94, 0),
     RGBColor(120, 94, 240),
+    RGBColor(125, 75, 35),
 ];
 
 const FONT: &str = "sans-serif";

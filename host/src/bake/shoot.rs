@@ -1,4 +1,5 @@
-//! Bounces that patches shoot along rows of form factors, through the solver's refinement.
+//! Bounces that patches shoot along rows of form factors, through the solver's refinement; rows that are missing when
+//! it ends, at the residual or early, are estimated.
 
 use relume::color::Rgb;
 use relume::mesh::Mesh;

@@ -365,6 +365,17 @@ fn json(report: &Report) -> Value {
         "shots_to_5_percent": report.first_looks.first().map(|look| {
             json!({"plain": look.plain, "kept": look.kept, "closed": look.closed})
         }),
+        "row_storage": report.storage.iter().map(|stored| {
+            let [five, one] = stored.to_errors;
+            json!({
+                "rows": stored.rows,
+                "bytes": stored.bytes,
+                "closed": stored.is_closed,
+                "rows_to_residual": stored.to_residual,
+                "rows_to_5_percent": five,
+                "rows_to_1_percent": one,
+            })
+        }).collect::<Vec<_>>(),
         "scenes": report.large.len(),
     })
 }
