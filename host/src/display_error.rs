@@ -43,6 +43,12 @@ pub fn max_codes_at(
     worst
 }
 
+/// `255 srgb(u)` of a value over white, clipped to [0, 255]; within 3e-4.
+#[must_use]
+pub fn shown_code(u: f32) -> f32 {
+    DISPLAY.code(u)
+}
+
 /// `255 srgb(u)`, linear between 256 places an octave: within 3e-4.
 struct DisplayTable(Vec<f32>);
 
