@@ -97,7 +97,9 @@ fn print(report: &Report) {
              {max_codes_solo:8.2} {max_codes:8.2} {mean_codes:8.3} {percent:7.3} % {nanoseconds:6.2}"
         );
     }
-    tell!("\n8-bit accumulation, codes of the linear framebuffer: lights, pass, largest, rms, bias");
+    tell!(
+        "\n8-bit accumulation, codes of the linear framebuffer: lights, pass, largest, rms, bias"
+    );
     for row in &report.accumulation {
         let pass = format!("{:?}", row.pass);
         tell!(
@@ -122,7 +124,9 @@ fn print(report: &Report) {
         range.ratio,
         range.published
     );
-    tell!("\nfour lights: memory, cost (published), largest error of dimmings, mean, ns an element");
+    tell!(
+        "\nfour lights: memory, cost (published), largest error of dimmings, mean, ns an element"
+    );
     for case in &report.cases {
         let published = case.published_memory.zip(case.published_cost);
         let published = published.map_or_else(String::new, |(memory, cost)| {
@@ -140,7 +144,9 @@ fn print(report: &Report) {
     }
     tell!("\nbits against error: what nothing beats in both");
     for rate in report.front() {
-        let step = rate.step.map_or_else(String::new, |step| format!("step {step}"));
+        let step = rate
+            .step
+            .map_or_else(String::new, |step| format!("step {step}"));
         tell!(
             "{:15} {step:10} {:6.2} bits {:8.2} codes",
             rate.format,

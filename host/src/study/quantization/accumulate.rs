@@ -159,7 +159,10 @@ impl Textures {
     /// Errors of a state with these dimmings: in codes of the framebuffer, and in display codes.
     fn errors(&self, dimmings: &[f32], pass: Pass) -> [Sums; 2] {
         let mut sums = [Sums::default(); 2];
-        let elements = self.exact.chunks(self.lights).zip(self.texels.chunks(self.lights));
+        let elements = self
+            .exact
+            .chunks(self.lights)
+            .zip(self.texels.chunks(self.lights));
         for (exact, texels) in elements {
             let exact = exact.iter().zip(dimmings);
             let exact = exact.fold(Rgb::BLACK, |sum, (value, dimming)| sum + *value * *dimming);
@@ -188,15 +191,16 @@ pub fn measure(scene: &'static str, solution: &Solution) -> Vec<Accumulation> {
             let states: Vec<[Sums; 2]> = (0..=DIMMINGS)
                 .into_par_iter()
                 .map(|state| {
-                    let dimmings: Vec<f32> = (0..k as u32)
-                        .map(|light| dimming(state, light))
-                        .collect();
+                    let dimmings: Vec<f32> =
+                        (0..k as u32).map(|light| dimming(state, light)).collect();
                     textures.errors(&dimmings, pass)
                 })
                 .collect();
             let mut all = [Sums::default(); 2];
             for state in states {
-                all.iter_mut().zip(state).for_each(|(all, own)| all.merge(own));
+                all.iter_mut()
+                    .zip(state)
+                    .for_each(|(all, own)| all.merge(own));
             }
             let [linear, display] = all;
             Accumulation {
@@ -256,7 +260,9 @@ mod tests {
         let mut all = [Sums::default(); 2];
         for step in 0..1000 {
             let dimming = 0.5 + 0.5 * step as f32 / 1000.0;
-            let dimmings: Vec<f32> = (0..10).map(|m| (dimming + 0.037 * m as f32).fract()).collect();
+            let dimmings: Vec<f32> = (0..10)
+                .map(|m| (dimming + 0.037 * m as f32).fract())
+                .collect();
             for (sum, pass) in all.iter_mut().zip([Pass::Truncate, Pass::Round]) {
                 sum.merge(textures.errors(&dimmings, pass)[0]);
             }

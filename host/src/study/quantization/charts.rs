@@ -42,15 +42,27 @@ fn ring(name: String, at: Option<(f64, f64)>) -> Series {
 /// Error against number of lights, for the mesh of a scene: largest of random dimmings, of lights alone, and mean.
 pub fn against_lights(rows: &[Row], scene: &str) -> Result<Vec<(String, String)>, ChartError> {
     let kinds: [(&str, &str, fn(&Row) -> f64); 3] = [
-        ("random", "largest error, random dimmings (display codes)", |row| {
-            row.max_codes_random.into()
-        }),
-        ("solo", "largest error, a light alone (display codes)", |row| {
-            row.max_codes_solo.into()
-        }),
-        ("mean", "mean error, random dimmings (display codes)", |row| row.mean_codes),
+        (
+            "random",
+            "largest error, random dimmings (display codes)",
+            |row| row.max_codes_random.into(),
+        ),
+        (
+            "solo",
+            "largest error, a light alone (display codes)",
+            |row| row.max_codes_solo.into(),
+        ),
+        (
+            "mean",
+            "mean error, random dimmings (display codes)",
+            |row| row.mean_codes,
+        ),
     ];
-    let least = rows.iter().filter(|row| row.scene == scene).map(|row| row.elements).min();
+    let least = rows
+        .iter()
+        .filter(|row| row.scene == scene)
+        .map(|row| row.elements)
+        .min();
     let own = || {
         let rows = rows.iter().filter(|row| row.scene == scene);
         rows.filter(move |row| Some(row.elements) == least)
@@ -69,7 +81,9 @@ pub fn against_lights(rows: &[Row], scene: &str) -> Result<Vec<(String, String)>
             title: format!("{scene}: error against the number of lights"),
             x: "lights".to_owned(),
             y: y.to_owned(),
-            series: curves.chain([level("one code", CODE, [1.0, largest])]).collect(),
+            series: curves
+                .chain([level("one code", CODE, [1.0, largest])])
+                .collect(),
         };
         Ok((format!("lights_{kind}.svg"), chart.svg()?))
     });
@@ -96,7 +110,9 @@ pub fn accumulation(measured: &[Accumulation]) -> Drawn {
         let from = at.map_or_else(|| "never".to_owned(), |(k, _)| format!("{k} lights"));
         ring(format!("{name}: {from}"), at)
     };
-    let ten = measured.iter().find(|row| row.pass == Pass::Truncate && row.k == 10);
+    let ten = measured
+        .iter()
+        .find(|row| row.pass == Pass::Truncate && row.k == 10);
     let chart = Chart {
         title: format!("{scene}: a pass per light into an 8-bit framebuffer"),
         x: "lights".to_owned(),
@@ -139,7 +155,9 @@ pub fn rates(rates: &[Rate]) -> Drawn {
     });
     let chart = Chart {
         title: rates.first().map_or_else(String::new, |first| {
-            let Rate { scene, k, elements, .. } = first;
+            let Rate {
+                scene, k, elements, ..
+            } = first;
             format!("{scene}, {k} lights, {elements} elements: bits against error")
         }),
         x: "bits per RGB element and light".to_owned(),
@@ -169,9 +187,14 @@ pub fn front(rates: &[Rate]) -> Vec<&Rate> {
 pub fn range(range: &Range, sweeps: &[(&'static str, Sweep)]) -> Drawn {
     let top = f64::from(range.largest);
     let percent = |sweep: &Sweep| -> Vec<(f64, f64)> {
-        sweep.iter().map(|(x, off)| (*x, 100.0 * off.max(1e-5))).collect()
+        sweep
+            .iter()
+            .map(|(x, off)| (*x, 100.0 * off.max(1e-5)))
+            .collect()
     };
-    let curves = sweeps.iter().map(|(name, sweep)| curve(*name, percent(sweep)));
+    let curves = sweeps
+        .iter()
+        .map(|(name, sweep)| curve(*name, percent(sweep)));
     let ratio = range.ratio;
     let chart = Chart {
         title: "what a code can tell apart".to_owned(),

@@ -1,7 +1,7 @@
 //! How far relit irradiance is off in many states, for several packings of one solution at once.
 //!
 //! The states are those of [`crate::display_error`]. Maxima are over elements, channels and states, in display codes;
-//! the mean is that of all differences in the achromatic mixed states. The relative error is
+//! the mean is that of all differences in the achromatic mixed states, but for those in which all is dark. The relative error is
 //! `sqrt(mean over those states of sum (found - exact)^2 / sum exact^2)`, sums over elements and channels.
 
 use rayon::prelude::*;
@@ -34,8 +34,8 @@ struct Tally {
     max: f32,
     /// Of all elements and channels.
     mean: f64,
-    /// Squared relative error.
-    relative: f64,
+    /// Squared relative error; `None` where all is dark.
+    relative: Option<f64>,
 }
 
 impl Tally {
@@ -53,7 +53,7 @@ impl Tally {
             }
         }
         tally.mean /= (3 * exact.len()).max(1) as f64;
-        tally.relative = if off > 0.0 { off / power } else { 0.0 };
+        tally.relative = (power > 0.0).then(|| off / power);
         tally
     }
 }
@@ -77,10 +77,10 @@ pub fn compare(solution: &Solution, decoded: &[&[Rgb]]) -> Vec<Errors> {
         for (state, tallies) in states.iter().zip(&mixed) {
             let tally = tallies[packing];
             errors.max_all = errors.max_all.max(tally.max);
-            if state.is_achromatic() {
+            if let Some(relative) = tally.relative.filter(|_| state.is_achromatic()) {
                 errors.max_random = errors.max_random.max(tally.max);
                 errors.mean += tally.mean;
-                errors.relative_rms += tally.relative;
+                errors.relative_rms += relative;
                 count += 1;
             }
         }
@@ -91,8 +91,8 @@ pub fn compare(solution: &Solution, decoded: &[&[Rgb]]) -> Vec<Errors> {
                 errors.max_solo = errors.max_solo.max(max);
             }
         }
-        errors.mean /= f64::from(count);
-        errors.relative_rms = (errors.relative_rms / f64::from(count)).sqrt();
+        errors.mean /= f64::from(count.max(1));
+        errors.relative_rms = (errors.relative_rms / f64::from(count.max(1))).sqrt();
         errors
     };
     (0..decoded.len()).map(of).collect()
@@ -148,12 +148,10 @@ pub fn exposure(exact: &[Rgb]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::quantization::scenes::tests::small;
-    use relume::atlas::Quantity;
-    use relume::code::Code;
-
     use crate::pack::{Format, contributions, pack_measured};
-    use relume::atlas::Atlas;
+    use crate::study::quantization::scenes::tests::small;
+    use relume::atlas::{Atlas, Quantity};
+    use relume::code::Code;
 
     #[test]
     fn errors_are_those_that_packing_states() {

@@ -194,7 +194,11 @@ impl Texel for Rgb9e5 {
         }
         let mantissa = |x: f32| (x / Self::step(biased)).round() as u32;
         let [r, g, b] = value.to_array().map(mantissa);
-        Self(r | g << Self::MANTISSA | b << (2 * Self::MANTISSA) | (biased as u32) << (3 * Self::MANTISSA))
+        Self(
+            r | g << Self::MANTISSA
+                | b << (2 * Self::MANTISSA)
+                | (biased as u32) << (3 * Self::MANTISSA),
+        )
     }
 
     fn decode(self) -> Rgb {
@@ -309,7 +313,9 @@ impl<T: Texel> Coded<T> {
             let strongest = largest.iter().zip(&nominal);
             let strongest = strongest.map(|(largest, emission)| largest * strength(emission));
             let strongest = strongest.fold(0.0, f32::max);
-            let own = nominal.iter().map(|emission| strongest / strength(emission));
+            let own = nominal
+                .iter()
+                .map(|emission| strongest / strength(emission));
             largest = own.collect();
         }
         let scales: Vec<f32> = largest.into_iter().map(T::scale).collect();
@@ -342,7 +348,9 @@ impl<T: Texel> Coded<T> {
         let elements = self.texels.chunks(weights.len().max(1));
         for (sum, texels) in irradiance.iter_mut().zip(elements) {
             let texels = texels.iter().zip(&weights);
-            *sum = texels.fold(Rgb::BLACK, |sum, (texel, weight)| sum + texel.decode() * *weight);
+            *sum = texels.fold(Rgb::BLACK, |sum, (texel, weight)| {
+                sum + texel.decode() * *weight
+            });
         }
     }
 }

@@ -110,7 +110,10 @@ pub fn measure(solution: &Solution) -> Result<Vec<Case>> {
         let [errors] = compare(&four, &[&stored.decoded])[..] else {
             continue;
         };
-        let (bits, time) = (LIGHTS as f64 * stored.bits_per_rgb, LIGHTS as f64 * stored.nanoseconds);
+        let (bits, time) = (
+            LIGHTS as f64 * stored.bits_per_rgb,
+            LIGHTS as f64 * stored.nanoseconds,
+        );
         cases.push(Case::new(format.name(), bits, time, errors));
     }
     let first = cases[0].nanoseconds;
@@ -129,7 +132,12 @@ fn one_group(four: &Solution) -> Result<Case> {
     let [errors] = compare(&one, &[&coded.decoded()])[..] else {
         anyhow::bail!("one packing has one error");
     };
-    let case = Case::new("one group in half floats", TEXEL_BITS, frame(&one, &coded)?, errors);
+    let case = Case::new(
+        "one group in half floats",
+        TEXEL_BITS,
+        frame(&one, &coded)?,
+        errors,
+    );
     Ok(Case {
         groups: 1,
         max_codes_solo: None,
@@ -144,7 +152,12 @@ fn four_groups(four: &Solution) -> Result<Case> {
         anyhow::bail!("one packing has one error");
     };
     let bits = LIGHTS as f64 * TEXEL_BITS;
-    let case = Case::new("four groups in half floats", bits, frame(four, &coded)?, errors);
+    let case = Case::new(
+        "four groups in half floats",
+        bits,
+        frame(four, &coded)?,
+        errors,
+    );
     Ok(case.published(1))
 }
 
@@ -181,8 +194,19 @@ fn packed(four: &Solution) -> Result<[Case; 2]> {
         Ok(())
     })?;
     Ok([
-        Case::new("four luminances (BT.601) in half floats", TEXEL_BITS, time, paper).published(2),
-        Case::new("four luminances (BT.709) in half floats", TEXEL_BITS, time, modern),
+        Case::new(
+            "four luminances (BT.601) in half floats",
+            TEXEL_BITS,
+            time,
+            paper,
+        )
+        .published(2),
+        Case::new(
+            "four luminances (BT.709) in half floats",
+            TEXEL_BITS,
+            time,
+            modern,
+        ),
     ])
 }
 
@@ -232,7 +256,12 @@ fn recombined(four: &Solution) -> Result<Case> {
         mean: errors.mean + 0.25,
         ..errors
     };
-    let case = Case::new("four groups, combined into 8 bits", TEXEL_BITS / 2.0, time, rounded);
+    let case = Case::new(
+        "four groups, combined into 8 bits",
+        TEXEL_BITS / 2.0,
+        time,
+        rounded,
+    );
     Ok(Case {
         recombination: Some(recombination),
         ..case.published(3)
@@ -265,6 +294,12 @@ mod tests {
         for weights in [BT601, BT709] {
             assert!((weights.r + weights.g + weights.b - 1.0).abs() < 1e-6);
         }
-        assert_eq!((Rgb::new(0.2, 0.5, 0.7) * BT709).to_array().iter().sum::<f32>(), Rgb::new(0.2, 0.5, 0.7).luminance());
+        assert_eq!(
+            (Rgb::new(0.2, 0.5, 0.7) * BT709)
+                .to_array()
+                .iter()
+                .sum::<f32>(),
+            Rgb::new(0.2, 0.5, 0.7).luminance()
+        );
     }
 }

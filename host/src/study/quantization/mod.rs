@@ -158,10 +158,18 @@ pub fn run(data: &Path, watch: impl Fn(&str)) -> Result<Report> {
 
     watch(&format!("{}: baking a fine mesh", Scene::FINE_256.name));
     let fine = Scene::FINE_256.bake(data)?;
-    let shown = [Code::Display8, Code::Tiles, Code::TilesLog].map(|code| Format::Atlas(code.into()));
+    let shown =
+        [Code::Display8, Code::Tiles, Code::TilesLog].map(|code| Format::Atlas(code.into()));
     for k in [64, 256] {
-        watch(&format!("{}: {k} lights on a fine mesh", Scene::FINE_256.name));
-        rows.extend(measure(Scene::FINE_256.name, &first_lights(&fine, k), &shown)?);
+        watch(&format!(
+            "{}: {k} lights on a fine mesh",
+            Scene::FINE_256.name
+        ));
+        rows.extend(measure(
+            Scene::FINE_256.name,
+            &first_lights(&fine, k),
+            &shown,
+        )?);
     }
     drop(fine);
 
@@ -215,7 +223,10 @@ pub fn measure(scene: &'static str, solution: &Solution, formats: &[Format]) -> 
 }
 
 fn store(solution: &Solution, formats: &[Format]) -> Result<Vec<Stored>> {
-    formats.iter().map(|format| format.store(solution)).collect()
+    formats
+        .iter()
+        .map(|format| format.store(solution))
+        .collect()
 }
 
 fn decoded(stored: &[Stored]) -> Vec<&[Rgb]> {
@@ -238,9 +249,13 @@ fn rates_and_wall(scene: &'static str, solution: &Solution) -> Result<(Vec<Rate>
     });
     let tiles = tiles.map(Format::Atlas);
     let is_tiles = |format: &Format| matches!(format, Format::Atlas(p) if p.code == Code::Tiles);
-    let fixed = formats.into_iter().zip(stored).filter(|(format, _)| !is_tiles(format));
-    let (formats, stored): (Vec<Format>, Vec<Stored>) =
-        fixed.chain(tiles.into_iter().zip(store(solution, &tiles)?)).unzip();
+    let fixed = formats
+        .into_iter()
+        .zip(stored)
+        .filter(|(format, _)| !is_tiles(format));
+    let (formats, stored): (Vec<Format>, Vec<Stored>) = fixed
+        .chain(tiles.into_iter().zip(store(solution, &tiles)?))
+        .unzip();
     let errors = compare(solution, &decoded(&stored));
     let rates = formats.iter().zip(stored).zip(errors);
     let rates = rates.map(|((format, stored), errors)| Rate {

@@ -81,7 +81,10 @@ pub fn sweeps() -> Vec<(&'static str, Sweep)> {
     let log = Curve::logarithmic(1e-12).unwrap_or(Curve::Exponential { scale: Scale::ONE });
     vec![
         ("exp8, exp8s", sweep(|x| decode(encode(x * top)) / top)),
-        (Code::TilesLog.name(), sweep(|x| log.decode(log.encode(x, u16::MAX)))),
+        (
+            Code::TilesLog.name(),
+            sweep(|x| log.decode(log.encode(x, u16::MAX))),
+        ),
         ("linear8", sweep(texel::<Linear8>)),
         ("sqrt8", sweep(texel::<Sqrt8>)),
         ("log8", sweep(texel::<Log8>)),
@@ -122,8 +125,14 @@ mod tests {
         assert!((range.largest - 255.0_f32.ln()).abs() < 1e-4, "{range:?}");
         assert!((range.ratio - 1410.0).abs() < 1.0, "{range:?}");
         // 0.5 / 255 in packed units: 1/510 but for the curve of the logarithm.
-        assert!((range.vanishes_below * 510.0 - 1.0).abs() < 2e-3, "{range:?}");
-        assert!((range.saturates_above - 510.0_f32.ln()).abs() < 1e-3, "{range:?}");
+        assert!(
+            (range.vanishes_below * 510.0 - 1.0).abs() < 2e-3,
+            "{range:?}"
+        );
+        assert!(
+            (range.saturates_above - 510.0_f32.ln()).abs() < 1e-3,
+            "{range:?}"
+        );
         // The paper's own division.
         assert!((range.published - 1413.0).abs() < 1.0);
         assert!((f64::from(range.largest) * 255.0 - range.published).abs() < 0.1);

@@ -76,7 +76,9 @@ pub fn first_lights(solution: &Solution, count: usize) -> Solution {
     let all = solution.lights.len();
     let mut mesh = solution.mesh.clone();
     for face in &mut mesh.faces {
-        face.emission = face.emission.filter(|emission| (emission.light as usize) < count);
+        face.emission = face
+            .emission
+            .filter(|emission| (emission.light as usize) < count);
     }
     let elements = solution.contributions.chunks(all.max(1));
     Solution {
@@ -84,7 +86,10 @@ pub fn first_lights(solution: &Solution, count: usize) -> Solution {
         luminaires: Vec::new(),
         mesh,
         lights: solution.lights[..count].to_vec(),
-        contributions: elements.flat_map(|values| &values[..count]).copied().collect(),
+        contributions: elements
+            .flat_map(|values| &values[..count])
+            .copied()
+            .collect(),
         direct: None,
         method: solution.method,
         rows: solution.rows,
@@ -116,7 +121,11 @@ pub mod tests {
         for element in 0..all.mesh.elements.len() {
             assert_eq!(three.element(element), &all.element(element)[..3]);
         }
-        let emitting = three.mesh.faces.iter().filter(|face| face.emission.is_some());
+        let emitting = three
+            .mesh
+            .faces
+            .iter()
+            .filter(|face| face.emission.is_some());
         assert_eq!(emitting.count(), 3);
     }
 }

@@ -109,13 +109,18 @@ pub struct Stored {
 /// The share of channels for which something holds of the value and what is read back.
 fn share(solution: &Solution, decoded: &[Rgb], holds: impl Fn(f32, f32) -> bool) -> f64 {
     let values = solution.contributions.iter().zip(decoded);
-    let channels = values.flat_map(|(value, found)| value.to_array().into_iter().zip(found.to_array()));
-    let count = channels.filter(|(value, found)| holds(*value, *found)).count();
+    let channels =
+        values.flat_map(|(value, found)| value.to_array().into_iter().zip(found.to_array()));
+    let count = channels
+        .filter(|(value, found)| holds(*value, *found))
+        .count();
     count as f64 / (3 * decoded.len()).max(1) as f64
 }
 
 fn vanished(solution: &Solution, decoded: &[Rgb]) -> f64 {
-    share(solution, decoded, |value, found| value > 0.0 && found == 0.0)
+    share(solution, decoded, |value, found| {
+        value > 0.0 && found == 0.0
+    })
 }
 
 /// Nanoseconds of the fastest repeat for each contribution.
@@ -143,7 +148,10 @@ fn atlas(solution: &Solution, packing: Packing) -> Result<Stored> {
     let mut saturated = 0_usize;
     if matches!(packing.code, Code::Exp8 | Code::Exp8s | Code::Lum8) {
         atlas.for_each(|_, _, codes| {
-            saturated += codes.iter().filter(|code| **code == u16::from(u8::MAX)).count();
+            saturated += codes
+                .iter()
+                .filter(|code| **code == u16::from(u8::MAX))
+                .count();
         });
     }
     Ok(Stored {
@@ -189,12 +197,21 @@ mod tests {
         for format in Format::all() {
             let stored = format.store(&solution).unwrap();
             assert_eq!(stored.decoded.len(), solution.contributions.len());
-            assert!(stored.nanoseconds > 0.0 && stored.bits_per_rgb > 0.0, "{format:?}");
+            assert!(
+                stored.nanoseconds > 0.0 && stored.bits_per_rgb > 0.0,
+                "{format:?}"
+            );
             assert!(stored.bytes as f64 >= stored.bits_per_rgb / 8.0 * stored.decoded.len() as f64);
             // Irradiance of a lit room: nowhere may a bright value be lost. Luminance alone loses colours.
-            let largest = solution.contributions.iter().map(|v| v.g).fold(0.0, f32::max);
+            let largest = solution
+                .contributions
+                .iter()
+                .map(|v| v.g)
+                .fold(0.0, f32::max);
             let values = solution.contributions.iter().zip(&stored.decoded);
-            let off = values.map(|(value, found)| (value.g - found.g).abs()).fold(0.0, f32::max);
+            let off = values
+                .map(|(value, found)| (value.g - found.g).abs())
+                .fold(0.0, f32::max);
             assert!(off < 0.2 * largest, "{format:?}: {off} of {largest}");
             names.push(format.name());
         }

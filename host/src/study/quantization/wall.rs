@@ -37,7 +37,10 @@ impl<'a> Wall<'a> {
     pub fn find(solution: &'a Solution, decoded: &[Rgb]) -> Option<Self> {
         let headroom = |light: &usize| {
             let own = column(solution, &solution.contributions, *light);
-            let largest = own.iter().map(|value| value.luminance()).fold(0.0, f32::max);
+            let largest = own
+                .iter()
+                .map(|value| value.luminance())
+                .fold(0.0, f32::max);
             largest / white(own).max(f32::MIN_POSITIVE)
         };
         let lights = 0..solution.lights.len();
@@ -62,7 +65,9 @@ impl<'a> Wall<'a> {
     #[must_use]
     pub fn title(&self) -> String {
         let light = &self.solution.lights[self.light].name;
-        format!("{light} alone, exposed for its white; largest and mean error on this wall, display codes")
+        format!(
+            "{light} alone, exposed for its white; largest and mean error on this wall, display codes"
+        )
     }
 
     /// Largest and mean error on the wall.
@@ -120,13 +125,19 @@ impl<'a> Wall<'a> {
         let pixel = SIDE / edges[0].max(edges[1]);
         let [width, height] = edges.map(|edge| (edge * pixel).round().max(1.0) as u32);
         let mut image = LinearImage::empty(width, height);
-        for (element, value) in mesh.elements[self.range()].iter().zip(&irradiance[self.range()]) {
+        for (element, value) in mesh.elements[self.range()]
+            .iter()
+            .zip(&irradiance[self.range()])
+        {
             let place = |at: f32, pixels: u32| (at * pixels as f32).round() as u32;
             let columns = place(element.from.x, width)..place(element.to.x, width);
             for y in place(element.from.y, height)..place(element.to.y, height) {
                 for x in columns.clone() {
                     let at = (y * width + x) as usize;
-                    let pixel = image.pixels.get_mut(at).context("elements lie in their face")?;
+                    let pixel = image
+                        .pixels
+                        .get_mut(at)
+                        .context("elements lie in their face")?;
                     *pixel = [value.r, value.g, value.b, 1.0];
                 }
             }
@@ -144,8 +155,8 @@ fn column(solution: &Solution, values: &[Rgb], light: usize) -> Vec<Rgb> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builtin::{PaperLamps, paper_room};
     use crate::bake::{Settings, bake};
+    use crate::builtin::{PaperLamps, paper_room};
 
     #[test]
     fn a_wall_is_shown_once_for_every_format_and_exactly_where_nothing_is_lost() {
@@ -164,7 +175,9 @@ mod tests {
         let same = wall.picture(&exact).unwrap();
         // No pixel of the wall is without an element.
         assert!(same.pixels().iter().all(|pixel| pixel.green() > 0));
-        let whole = wall.sheet(&[("same", &solution.contributions), ("darker", &darker)]).unwrap();
+        let whole = wall
+            .sheet(&[("same", &solution.contributions), ("darker", &darker)])
+            .unwrap();
         assert!(whole.width() > 3 * same.width());
     }
 }
