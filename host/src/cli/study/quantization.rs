@@ -151,7 +151,7 @@ fn print(report: &Report) {
             "{:15} {step:10} {:6.2} bits {:8.2} codes",
             rate.format,
             rate.bits_per_rgb,
-            rate.max_codes
+            rate.max_codes_dimming
         );
     }
 }

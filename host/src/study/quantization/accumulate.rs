@@ -3,7 +3,8 @@
 //! One pass a light: texels of 8 bits times the light's dimming are brought to the framebuffer's codes and added,
 //! `F <- min(F + round(255 d_m s_m t_m), 255)`, or cut off instead of rounded, with `t_m` the texture in [0, 1],
 //! `s_m` its scale in units of white, `d_m` in [0, 1]. White is that of all lights on, and exposure does not change:
-//! textures are made once. A texture clips at white, where its light saturates the framebuffer anyway.
+//! textures are made once. A texture clips at white, where its light saturates the framebuffer anyway; what that loses when
+//! the light dims is no error of the sum and is not counted.
 //! (J. Dorsey, J. Arvo and D. Greenberg 1995; M. Nielsen and N. J. Christensen 2002, section 5, saw "visible quantization
 //! artifacts when using many lights, e.g. more than 10", on 24-bit texels.)
 //!
@@ -116,7 +117,7 @@ impl Sums {
 
 /// The first lights of a solution in textures of 8 bits.
 struct Textures {
-    /// Nominal contributions in units of white, element by element, light by light.
+    /// Nominal contributions in units of white, at most 1, element by element, light by light.
     exact: Vec<Rgb>,
     /// The same as textures hold them.
     texels: Vec<Rgb>,
@@ -135,18 +136,21 @@ impl Textures {
             .map(|values| own(values).into_iter().fold(Rgb::BLACK, |a, b| a + b))
             .collect();
         let exposure = exposure(&on);
-        let exact: Vec<Rgb> = elements().flat_map(own).map(|v| v * exposure).collect();
+        let exact = elements().flat_map(own);
+        let exact: Vec<Rgb> = exact
+            .map(|value| value.map(|x| (x * exposure).min(1.0)))
+            .collect();
         let mut scales = vec![0.0_f32; lights];
         for values in exact.chunks(lights.max(1)) {
             for (scale, value) in scales.iter_mut().zip(values) {
-                *scale = scale.max(value.max_channel().min(1.0));
+                *scale = scale.max(value.max_channel());
             }
         }
         let texels = exact.chunks(lights.max(1)).flat_map(|values| {
             let values = values.iter().zip(&scales);
             values.map(|(value, scale)| {
                 let scale = scale.max(f32::MIN_POSITIVE);
-                value.map(|x| (255.0 * (x / scale).min(1.0)).round() / 255.0 * scale)
+                value.map(|x| (255.0 * x / scale).round() / 255.0 * scale)
             })
         });
         Self {

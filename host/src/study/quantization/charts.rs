@@ -140,7 +140,12 @@ pub fn accumulation(measured: &[Accumulation]) -> Drawn {
 
 /// Bits against error, and what nothing else beats in both.
 pub fn rates(rates: &[Rate]) -> Drawn {
-    let point = |rate: &Rate| (rate.bits_per_rgb, f64::from(rate.max_codes).max(LEAST));
+    let point = |rate: &Rate| {
+        (
+            rate.bits_per_rgb,
+            f64::from(rate.max_codes_dimming).max(LEAST),
+        )
+    };
     let mut series: Vec<Series> = Vec::new();
     for rate in rates {
         match series.iter_mut().find(|series| series.name == rate.format) {
@@ -172,12 +177,12 @@ pub fn front(rates: &[Rate]) -> Vec<&Rate> {
     let mut sorted: Vec<&Rate> = rates.iter().collect();
     sorted.sort_by(|a, b| {
         let bits = a.bits_per_rgb.total_cmp(&b.bits_per_rgb);
-        bits.then(a.max_codes.total_cmp(&b.max_codes))
+        bits.then(a.max_codes_dimming.total_cmp(&b.max_codes_dimming))
     });
     let mut least = f32::INFINITY;
     sorted.retain(|rate| {
-        let is_better = rate.max_codes < least;
-        least = least.min(rate.max_codes);
+        let is_better = rate.max_codes_dimming < least;
+        least = least.min(rate.max_codes_dimming);
         is_better
     });
     sorted

@@ -89,6 +89,8 @@ pub struct Rate {
     /// Bits of an element and light.
     pub bits_per_rgb: f64,
     /// Largest error where lights dim or shine alone, in display codes.
+    pub max_codes_dimming: f32,
+    /// Largest error in all states.
     pub max_codes: f32,
     /// Mean error where lights dim.
     pub mean_codes: f64,
@@ -268,7 +270,8 @@ fn rates_and_wall(scene: &'static str, solution: &Solution) -> Result<(Vec<Rate>
             _ => None,
         },
         bits_per_rgb: stored.bits_per_rgb,
-        max_codes: errors.max_random.max(errors.max_solo),
+        max_codes_dimming: errors.max_random.max(errors.max_solo),
+        max_codes: errors.max_all,
         mean_codes: errors.mean,
     });
     Ok((rates.collect(), wall))

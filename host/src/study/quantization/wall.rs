@@ -1,7 +1,7 @@
 //! One wall by one light alone, under every format side by side.
 //!
-//! The light is the one whose brightest spot is furthest above its own white; the wall is the one on which the published
-//! code with a scale per light is furthest off on average. Irradiance is shown as it is packed: every element in one colour,
+//! The light is the one whose brightest spot is furthest above its own white; the wall is that one of the larger faces
+//! on which the published code with a scale per light is furthest off on average. Irradiance is shown as it is packed: every element in one colour,
 //! exposed for the white of the whole exact state.
 
 use anyhow::{Context, Result};
@@ -18,9 +18,6 @@ const SIDE: f32 = 240.0;
 
 /// Pictures in a row.
 const COLUMNS: u32 = 4;
-
-/// Fewest elements of a wall.
-const ELEMENTS: u32 = 64;
 
 /// A light alone on a face.
 #[derive(Clone, Copy, Debug)]
@@ -55,7 +52,8 @@ impl<'a> Wall<'a> {
             exposure,
         };
         let faces = solution.mesh.faces.iter().enumerate();
-        let walls = faces.filter(|(_, face)| face.element_count >= ELEMENTS);
+        let largest = faces.clone().map(|(_, face)| face.element_count).max()?;
+        let walls = faces.filter(|(_, face)| face.element_count > largest / 2);
         let walls = walls.map(|(number, _)| wall(number));
         let off = |wall: &Self| wall.errors(&exact, &found).1;
         walls.max_by(|a, b| off(a).total_cmp(&off(b)))
