@@ -48,7 +48,7 @@ const FONT: &str = "sans-serif";
 /// How a series is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
-    /// Dots in a colour of their own, joined in their order.
+    /// Dots in a colour of their own, joined in their order; open dots once all colours are used.
     Curve,
     /// Dots in a colour of their own.
     Dots,
@@ -244,7 +244,8 @@ fn line_style(style: Style, number: usize) -> Option<ShapeStyle> {
 /// Radius and style of the dots of a series.
 fn dot_style(style: Style, number: usize) -> Option<(i32, ShapeStyle)> {
     match style {
-        Style::Curve => Some((4, colour(number).filled())),
+        Style::Curve if number < PALETTE.len() => Some((4, colour(number).filled())),
+        Style::Curve => Some((5, colour(number).stroke_width(2))),
         Style::Dots => Some((6, colour(number).filled())),
         Style::Front | Style::Limit => None,
         Style::Ring => Some((10, RGBColor(200, 0, 0).stroke_width(3))),

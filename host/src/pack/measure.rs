@@ -11,13 +11,13 @@ use super::Source;
 use crate::display_error::{Mixed, Solo, max_codes_at};
 
 /// States that are relit at once.
-const LANES: usize = 8;
+pub(crate) const LANES: usize = 8;
 
 /// Blocks of states and lights that are judged before a limit is looked at.
 const BATCH: usize = 16;
 
-/// Red, green and blue of one element in every state of a block.
-type Lanes = [[f32; LANES]; 3];
+/// Red, green and blue of one element, or the weights of one light, in every state of a block.
+pub(crate) type Lanes = [[f32; LANES]; 3];
 
 /// Errors of an atlas against its solution, in display codes.
 #[derive(Clone, Debug, PartialEq)]
@@ -121,16 +121,9 @@ pub(super) fn foremost(source: &Source, decoded: &[Rgb], limit: f32) -> PackingE
 
 /// The error in each of some states, at most [`LANES`].
 fn block(source: &Source, decoded: &[Rgb], states: &[Mixed]) -> Vec<WorstError> {
-    let nominal = source.solution.nominal_mix();
-    let mut weights = vec![[[0.0; LANES]; 3]; nominal.len()];
-    for ((weights, nominal), light) in weights.iter_mut().zip(&nominal).zip(0..) {
-        for (lane, state) in states.iter().enumerate() {
-            let weight = state.weight(light, *nominal).to_array();
-            (0..3).for_each(|channel| weights[channel][lane] = weight[channel]);
-        }
-    }
+    let weights = weights(&source.solution.nominal_mix(), states);
     let relit = |values: &[Rgb]| -> Vec<Lanes> {
-        let elements = values.chunks(nominal.len().max(1));
+        let elements = values.chunks(weights.len().max(1));
         elements.map(|values| relit(values, &weights)).collect()
     };
     let (exact, found) = (relit(&source.values), relit(decoded));
@@ -147,8 +140,20 @@ fn block(source: &Source, decoded: &[Rgb], states: &[Mixed]) -> Vec<WorstError> 
     judged.collect()
 }
 
+/// The weights of all lights in each of some states, at most [`LANES`].
+pub(crate) fn weights(nominal: &[Rgb], states: &[Mixed]) -> Vec<Lanes> {
+    let mut weights = vec![[[0.0; LANES]; 3]; nominal.len()];
+    for ((weights, nominal), light) in weights.iter_mut().zip(nominal).zip(0..) {
+        for (lane, state) in states.iter().enumerate() {
+            let weight = state.weight(light, *nominal).to_array();
+            (0..3).for_each(|channel| weights[channel][lane] = weight[channel]);
+        }
+    }
+    weights
+}
+
 /// One element: the sum over its lights in every state.
-fn relit(values: &[Rgb], weights: &[Lanes]) -> Lanes {
+pub(crate) fn relit(values: &[Rgb], weights: &[Lanes]) -> Lanes {
     let mut sums = [[0.0; LANES]; 3];
     for (value, weights) in values.iter().zip(weights) {
         let channels = sums.iter_mut().zip(weights).zip(value.to_array());

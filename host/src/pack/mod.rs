@@ -19,6 +19,7 @@ use crate::solution::Solution;
 
 pub use choose::{Aim, Candidate, Choice, Judged, Request, choose};
 pub use measure::PackingError;
+pub(crate) use measure::{LANES, Lanes, relit, weights};
 pub use unpack::{TooLarge, contributions, unpack};
 
 /// How a light is packed.
@@ -147,6 +148,16 @@ pub fn pack_lights(
     let packed = Packed::new(&source, packings)?;
     let error = measure::measure(&source, &packed.decoded()?, f32::INFINITY);
     Ok((packed.write(mesh, Some(&error))?, error))
+}
+
+/// An atlas of irradiance without a mesh, whose errors nobody measured.
+///
+/// # Errors
+/// [`PackError`] when counts or values leave the format's range.
+pub fn pack_unmeasured(solution: &Solution, packing: Packing) -> Result<Vec<u8>, PackError> {
+    let source = Source::new(solution, Quantity::Irradiance);
+    let packings = vec![packing; solution.lights.len()];
+    Ok(Packed::new(&source, &packings)?.write(false, None)?)
 }
 
 /// Compares an atlas with the solution that it was packed from.

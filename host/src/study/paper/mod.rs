@@ -6,7 +6,7 @@
 //! are medians of several repeats; published ones stand beside them as they were printed.
 
 pub mod cached;
-mod clock;
+pub(super) mod clock;
 pub mod early;
 pub mod faces;
 pub mod job;
