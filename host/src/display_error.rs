@@ -75,8 +75,7 @@ impl DisplayTable {
         if u >= 1.0 {
             return 255.0;
         }
-        // Catches NaN too.
-        if !(u >= Self::LOWEST) {
+        if u.is_nan() || u < Self::LOWEST {
             return 255.0 * 12.92 * u.max(0.0);
         }
         let bits = u.to_bits() - Self::LOWEST.to_bits();
