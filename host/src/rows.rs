@@ -69,22 +69,21 @@ pub trait RowFiller {
 
 /// Estimates the rows that a refinement misses ([`Refinement::close`]) and solves with them.
 ///
-/// False, and no change, where there is no room for all rows.
+/// Where there is no room for all rows nothing changes.
 pub fn close<const K: usize>(
     refinement: &mut Refinement<K>,
     mesh: &Mesh,
     scene: &Scene,
     filler: &impl RowFiller,
-) -> bool {
+) {
     let is_closed = luminaire::is_closed(mesh, luminaire::far(scene), filler.visibility());
     let dark = is_closed.then(|| dark_shares(mesh, scene, filler));
-    let has_closed = refinement.close(dark.as_deref(), |patch, row| {
+    refinement.close(dark.as_deref(), |patch, row| {
         if let Some(polygon) = mesh.patch_polygon(patch) {
             filler.estimate(mesh, &polygon, row);
         }
     });
     refinement.finish();
-    has_closed
 }
 
 /// What share of every element's view has no patches.

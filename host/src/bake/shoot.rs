@@ -119,11 +119,10 @@ pub(super) fn refine<F: RowFiller>(
     }
     refinement.finish();
     let mut left = Left::of(&refinement, &mesh, lights as u32, settings);
-    if settings.missing == Missing::Closed && refinement.rows_evaluated() < most {
-        let has_closed = rows::close(&mut refinement, &mesh.view(), job.scene, &filler);
-        if has_closed {
-            left.close();
-        }
+    let misses_rows = rows == p && refinement.rows_evaluated() < most;
+    if misses_rows && settings.missing == Missing::Closed {
+        rows::close(&mut refinement, &mesh.view(), job.scene, &filler);
+        left.close();
     }
     Ok(read_out(&mesh, lights as u32, settings, left, &refinement))
 }

@@ -25,10 +25,43 @@ impl<const K: usize> Refinement<'_, K> {
     ///
     /// `estimate(patch, row)` fills a row of zeros. `dark` is the share of every element's view that no patch
     /// fills, if the scene is closed (zeros where all that is seen reflects or shines), and `None` if light can
-    /// escape. From then on estimated rows count as known: [`Self::next_shooter`] has nothing to ask for, and
-    /// residuals are those of the closed system.
+    /// escape. From then on estimated rows count as known: [`Self::next_shooter`] has nothing to ask for, and residuals
+    /// and errors are those of the closed system, near zero; what was missing is told by [`Self::light_error`] before.
     ///
     /// False, and no change, when the storage has no room for the rows of all patches.
+    ///
+    /// ```
+    /// # use glam::Vec3;
+    /// # use relume::color::Rgb;
+    /// # use relume::form_factor::{self, Shooter};
+    /// # use relume::mesh::{MeshStorage, Spacing, subdivide};
+    /// # use relume::refine::{FixedStorage, Refinement};
+    /// # use relume::scene::{Emission, Scene, Surface};
+    /// # use relume::visibility::Occluders;
+    /// # let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
+    /// # let floor = corners.map(|(x, y)| Vec3::new(x, y, 0.0));
+    /// # let lamp = corners.map(|(x, y)| Vec3::new(y, x, 1.0));
+    /// # let emission = Emission { light: 0, share: Rgb::WHITE };
+    /// # let surfaces = [
+    /// #     Surface::new(0, &floor, Rgb::splat(0.5))?,
+    /// #     Surface::new(1, &lamp, Rgb::BLACK)?.emitting(1, emission)?,
+    /// # ];
+    /// # let scene = Scene::new(&surfaces, &[], 1)?;
+    /// # let mut meshed = MeshStorage::<2, 2, 16>::new();
+    /// # subdivide(&scene, Spacing { patch: 1.0, element: 0.25 }, |_, _| true, &mut meshed)?;
+    /// # let mesh = meshed.mesh();
+    /// // The scene of the crate's example, without a single exact row.
+    /// let mut memory = FixedStorage::<1, 2, 16, 2>::new();
+    /// let mut refinement = Refinement::new(mesh, 1, 1e-3, memory.storage())?;
+    /// refinement.close(None, |patch, row| {
+    ///     if let Some(polygon) = mesh.patch_polygon(patch) {
+    ///         form_factor::estimate(&mesh, &Shooter::new(polygon), 0, &Occluders(&surfaces), row);
+    ///     }
+    /// });
+    /// refinement.finish();
+    /// assert!((0.2..0.25).contains(&refinement.irradiance(5, 0).g));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn close(
         &mut self,
         dark: Option<&[f32]>,
