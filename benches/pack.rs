@@ -2,7 +2,7 @@
 //!
 //! The paper's room with 8 lights, 960 x 8 contributions of three channels: `encode` and `decode`
 //! work on single values, spread over the range of the code; `measured` adds scales and bytes and the
-//! error over 73 states of the lights, `parse` checks the bytes again (checksum and every value),
+//! error over 1335 states of the lights, `parse` checks the bytes again (checksum and every value),
 //! `unpack` makes a solution of them.
 
 mod scenes;

@@ -75,8 +75,7 @@ impl DisplayTable {
         if u >= 1.0 {
             return 255.0;
         }
-        // Catches NaN too.
-        if !(u >= Self::LOWEST) {
+        if u.is_nan() || u < Self::LOWEST {
             return 255.0 * 12.92 * u.max(0.0);
         }
         let bits = u.to_bits() - Self::LOWEST.to_bits();
@@ -119,7 +118,8 @@ impl Mixed {
     /// Of [`Self::Dimmed`] it is the nominal one, since [`Self::brightness`] does the same.
     #[must_use]
     pub fn weight(self, light: u32, nominal: Rgb) -> Rgb {
-        let chance = |state: u16, number: u32| noise::unit(u64::from(state) << 32 | u64::from(number));
+        let chance =
+            |state: u16, number: u32| noise::unit(u64::from(state) << 32 | u64::from(number));
         match self {
             Self::AllOn | Self::Overexposed | Self::Dimmed => nominal,
             Self::Dimming(state) => {
@@ -272,6 +272,9 @@ mod tests {
     #[test]
     fn a_light_that_is_nominally_dark_is_tried_all_the_same() {
         assert_eq!(Solo::Nominal.weight(Rgb::BLACK), Rgb::WHITE);
-        assert_eq!(Solo::Blue.weight(Rgb::new(3.0, 1.0, 0.0)), Rgb::new(0.0, 0.0, 3.0));
+        assert_eq!(
+            Solo::Blue.weight(Rgb::new(3.0, 1.0, 0.0)),
+            Rgb::new(0.0, 0.0, 3.0)
+        );
     }
 }

@@ -9,7 +9,7 @@ use relume::code::Code;
 use serde_json::{Value, json};
 
 use super::load::{Loaded, load};
-use super::{Outcome, human_bytes, output_path, spare, tell, wrong_usage, write_file};
+use super::{Outcome, human_bytes, output_path, spare, tell, write_file, wrong_usage};
 use crate::mix::find;
 use crate::pack::{Aim, Candidate, Choice, Judged, Packing, Request, choose, pack_lights};
 use crate::solution::Solution;
@@ -116,8 +116,7 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     let packings: Option<Vec<Packing>> = given.iter().copied().collect();
     let (bytes, error, candidates) = match packings {
         Some(packings) if !packings.is_empty() || arguments.common().is_some() => {
-            let (bytes, error) =
-                pack_lights(&solution, &packings, quantity, mesh).context(path)?;
+            let (bytes, error) = pack_lights(&solution, &packings, quantity, mesh).context(path)?;
             (bytes, error, Vec::new())
         }
         _ => {

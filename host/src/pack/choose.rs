@@ -13,7 +13,15 @@ use relume::atlas::Quantity;
 use relume::code::Code;
 
 /// Shares of a light's white above which steps of `tiles` are logarithmic.
-const WHITES: [f32; 7] = [1.0, 0.5, 0.25, 0.125, 0.062_5, 0.031_25, 0.015_625];
+const WHITES: [f32; 7] = [
+    1.0,
+    1.0 / 4.0,
+    1.0 / 16.0,
+    1.0 / 64.0,
+    1.0 / 256.0,
+    1.0 / 1024.0,
+    1.0 / 4096.0,
+];
 
 /// Most steps of an octave.
 const FINEST: u16 = 1024;
@@ -118,7 +126,9 @@ fn draft(solution: &Solution) -> Option<(Vec<usize>, Solution)> {
     let mut mesh = solution.mesh.clone();
     for face in &mut mesh.faces {
         face.emission = face.emission.and_then(|mut emission| {
-            let tag = tags.iter().position(|tag| *tag == emission.light as usize)?;
+            let tag = tags
+                .iter()
+                .position(|tag| *tag == emission.light as usize)?;
             emission.light = tag as u32;
             Some(emission)
         });
@@ -128,7 +138,10 @@ fn draft(solution: &Solution) -> Option<(Vec<usize>, Solution)> {
         surfaces: Vec::new(),
         luminaires: Vec::new(),
         mesh,
-        lights: tags.iter().map(|tag| solution.lights[*tag].clone()).collect(),
+        lights: tags
+            .iter()
+            .map(|tag| solution.lights[*tag].clone())
+            .collect(),
         contributions: elements
             .flat_map(|values| tags.iter().map(|tag| values[*tag]))
             .collect(),
@@ -348,11 +361,7 @@ fn most_exact(full: &Search, draft: &Search, budget: usize) -> Result<Choice, Pa
 }
 
 /// Most steps of an octave that a budget allows; `None` when a single one takes more.
-fn finest_within(
-    full: &Search,
-    white: f32,
-    budget: usize,
-) -> Result<Option<u16>, PackError> {
+fn finest_within(full: &Search, white: f32, budget: usize) -> Result<Option<u16>, PackError> {
     let fits = |steps: u16| -> Result<bool, PackError> {
         let tried = full.attempt(tiles(white, steps))?;
         Ok(tried.is_some_and(|tried| tried.candidate.bytes <= budget))

@@ -205,8 +205,9 @@ fn judge(
         .faces
         .iter()
         .map(|face| {
-            face.emission
-                .map_or(Rgb::BLACK, |emission| emission.share * weight(emission.light))
+            face.emission.map_or(Rgb::BLACK, |emission| {
+                emission.share * weight(emission.light)
+            })
         })
         .collect();
     let shown = |value: Rgb, element: &relume::mesh::Element| {

@@ -51,7 +51,10 @@ impl fmt::Display for Packing {
         self.code.fmt(f)?;
         if self.code == Code::Tiles {
             let (step, white) = (self.step, self.white);
-            write!(f, " (steps of {step:.3} codes, ratios above {white} of white)")?;
+            write!(
+                f,
+                " (steps of {step:.3} codes, ratios above {white} of white)"
+            )?;
         }
         Ok(())
     }
@@ -79,7 +82,9 @@ pub enum PackError {
     #[error("light {0:?}: its values leave the range that can be packed; change its emission")]
     Scale(String),
     /// Nothing keeps the error that is wanted.
-    #[error("no packing stays within {limit} display codes; the most exact one, {best}, is off by {error:.3}: allow as much")]
+    #[error(
+        "no packing stays within {limit} display codes; the most exact one, {best}, is off by {error:.3}: allow as much"
+    )]
     TooExact {
         /// What was wanted.
         limit: f32,
@@ -89,7 +94,9 @@ pub enum PackError {
         error: f32,
     },
     /// Nothing is as small as is wanted.
-    #[error("no packing fits {budget} bytes; the smallest one, {best}, takes {bytes}: give as many, leave out the mesh, or use longer elements")]
+    #[error(
+        "no packing fits {budget} bytes; the smallest one, {best}, takes {bytes}: give as many, leave out the mesh, or use longer elements"
+    )]
     TooSmall {
         /// What was wanted.
         budget: usize,
@@ -203,7 +210,7 @@ struct Packed<'a> {
 impl<'a> Packed<'a> {
     /// Encodes a source, each light in a packing of its own.
     fn new(source: &'a Source, packings: &[Packing]) -> Result<Self, PackError> {
-        let entries = curves::entries(source.solution, &source.values, packings)?;
+        let entries = curves::entries(source, packings)?;
         let tiles = tiles::encode(&source.solution.mesh, &entries, &source.values);
         Ok(Self {
             source,

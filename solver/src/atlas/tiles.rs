@@ -198,6 +198,12 @@ pub struct TileBits<'a> {
 }
 
 impl TileBits<'_> {
+    /// Bits that were not read yet, with those of the tiles that follow.
+    #[must_use]
+    pub fn remaining(&self) -> usize {
+        8 * self.bits.bytes.len() + self.bits.held as usize
+    }
+
     /// Reads the next light into the beginning of `block`; false, and nothing is written, when all
     /// its codes are 0. Codes beyond `last` are taken as that.
     pub fn next_light(&mut self, place: Place, last: [u16; 3], block: &mut Block) -> bool {

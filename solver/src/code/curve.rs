@@ -99,6 +99,12 @@ impl Curve {
             })
     }
 
+    /// Units of a display curve, its first code or its step, in display codes.
+    #[must_use]
+    pub fn display_codes(units: u32) -> f32 {
+        units as f32 / UNITS as f32
+    }
+
     /// The display curve on which code 0 is `smallest`, or below by rounding, and code `last` is
     /// `largest` or above; `None` unless `0 <= smallest <= largest` and the curve reaches that far.
     #[must_use]
