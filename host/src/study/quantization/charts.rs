@@ -12,7 +12,7 @@ type Drawn = Result<(String, String), ChartError>;
 const CODE: f64 = 1.0;
 
 /// What is drawn as zero on a logarithmic axis.
-const LEAST: f64 = 1e-2;
+const LEAST: f64 = 1e-3;
 
 fn curve(name: impl Into<String>, points: Vec<(f64, f64)>) -> Series {
     Series {
