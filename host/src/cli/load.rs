@@ -9,7 +9,7 @@ use relume::color::Rgb;
 
 use super::tell;
 use crate::export::exr::read_light_layers;
-use crate::import::light_layers::contributions;
+use crate::export::light_layers::contributions;
 use crate::pack::{relight_atlas, unpack};
 use crate::solution::{self, Solution};
 
@@ -50,7 +50,7 @@ pub fn load(path: &Path) -> Result<Loaded> {
     }
     if !bytes.starts_with(&relume::atlas::MAGIC) {
         bail!(
-            "{}: no solution, atlas or OpenEXR picture with a layer per light; make one with `relume bake` or `relume pack`",
+            "{}: neither a solution nor an atlas, nor an OpenEXR picture; make one with `relume bake` or `relume pack`",
             path.display()
         );
     }

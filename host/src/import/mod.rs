@@ -17,7 +17,6 @@ mod gltf_data;
 mod gltf_file;
 mod gltf_lights;
 mod gltf_materials;
-pub mod light_layers;
 mod lights;
 mod obj;
 mod obj_materials;

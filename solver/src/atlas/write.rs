@@ -124,10 +124,14 @@ pub fn write(
     let mut output = Output { rest: bytes };
     header(contents, needed, &mut output)?;
     lights(contents, &mut output)?;
-    for element in 0..contents.elements {
-        for (light, tag) in contents.lights.iter().zip(0..) {
-            if !light.code.is_tiled() {
-                codes(light, contribution(element, tag), &mut output)?;
+    // There may be millions of lights in tiles, which have nothing here.
+    let is_fixed = |light: &LightEntry| !light.code.is_tiled();
+    if contents.lights.iter().any(is_fixed) {
+        for element in 0..contents.elements {
+            for (light, tag) in contents.lights.iter().zip(0..) {
+                if is_fixed(light) {
+                    codes(light, contribution(element, tag), &mut output)?;
+                }
             }
         }
     }

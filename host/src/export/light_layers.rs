@@ -9,13 +9,13 @@
 use relume::color::Rgb;
 use relume::mesh::Spacing;
 
-use crate::export::exr::LightLayer;
+use super::exr::LightLayer;
 use crate::mesh::OwnedMesh;
 use crate::solution::{Method, Solution, SolutionLight};
 
 /// Contributions whose elements are pixels, row by row from the top, and how many values were no light.
 ///
-/// The layers have one size, as [`read_light_layers`](crate::export::exr::read_light_layers) makes sure.
+/// The layers have one size, as [`read_light_layers`](super::exr::read_light_layers) makes sure.
 #[must_use]
 pub fn contributions(layers: &[LightLayer]) -> (Solution, usize) {
     let size = layers.first().map(|(_, image)| [image.width, image.height]);
