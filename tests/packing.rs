@@ -141,7 +141,7 @@ fn sixty_four_lights_take_less_than_the_paper_took_for_eight() {
 
 /// Bakes 8640 elements of 64 and of 256 lights: minutes of CPU.
 ///
-/// 64 lights keep the aims of the issue; 256, whose small lamps stand closer to the walls, miss them: limits there are what was
+/// 64 lights keep the aims of the issue; 256 miss them: limits there are what was
 /// measured (8.24 and 11.01 bits; 2.24 and 3.44 codes).
 #[test]
 #[ignore = "slow: run it by name"]

@@ -5,6 +5,9 @@ use super::range::{Range, Sweep};
 use super::{Rate, Row};
 use crate::chart::{Chart, ChartError, Series, Style, Vertical};
 
+/// What is read off a row.
+type Quantity = fn(&Row) -> f64;
+
 /// The name and the text of an SVG.
 type Drawn = Result<(String, String), ChartError>;
 
@@ -44,7 +47,7 @@ fn ring(name: String, at: Option<(f64, f64)>) -> Series {
 
 /// Error against number of lights, for the mesh of a scene: largest of random dimmings, of lights alone, and mean.
 pub fn against_lights(rows: &[Row], scene: &str) -> Result<Vec<(String, String)>, ChartError> {
-    let kinds: [(&str, &str, fn(&Row) -> f64); 3] = [
+    let kinds: [(&str, &str, Quantity); 3] = [
         (
             "random",
             "largest error, random dimmings (display codes)",
