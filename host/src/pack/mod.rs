@@ -240,7 +240,9 @@ impl<'a> Packed<'a> {
             image_width: solution.image.map_or(0, |[width, _]| width as u16),
             errors,
             tiles: &self.tiles,
-            mesh: with_mesh.then(|| (&solution.surfaces[..], solution.mesh.view())),
+            // A picture has none.
+            mesh: (with_mesh && solution.image.is_none())
+                .then(|| (&solution.surfaces[..], solution.mesh.view())),
         }
     }
 
