@@ -92,18 +92,21 @@ pub(super) struct Met {
 }
 
 impl Met {
-    /// Nothing so far, and nothing farther than this will do.
-    pub const fn nothing(farthest: f32) -> Self {
+    /// Nothing nearer than a distance.
+    pub const fn nothing(distance: f32) -> Self {
         Self {
-            distance: farthest,
+            distance,
             surface: u32::MAX,
             front: false,
         }
     }
 
-    /// What was met, if it is nearer than what would not do.
-    pub fn hit(self, farthest: f32) -> Option<Hit> {
-        (self.distance < farthest).then_some(Hit {
+    pub const fn is_surface(&self) -> bool {
+        self.surface != u32::MAX
+    }
+
+    pub fn hit(self) -> Option<Hit> {
+        self.is_surface().then_some(Hit {
             surface: self.surface,
             distance: self.distance,
             front: self.front,

@@ -203,11 +203,21 @@ pub struct Narrowed<'a> {
     blockers: Vec<&'a Polygon>,
 }
 
-impl Narrowed<'_> {
+impl<'a> Narrowed<'a> {
     /// How many there are.
     #[must_use]
     pub const fn blockers(&self) -> usize {
         self.blockers.len()
+    }
+
+    /// Those of them that can stand between parts of the two regions.
+    #[must_use]
+    pub fn narrowed(&self, shaft: &Shaft) -> Self {
+        let blockers = self.blockers.iter().copied();
+        Self {
+            bvh: self.bvh,
+            blockers: blockers.filter(|polygon| shaft.admits(polygon)).collect(),
+        }
     }
 }
 

@@ -1,4 +1,4 @@
-//! The nearest surface along a ray.
+//! The nearest surface along a ray, and whether there is one at all.
 //!
 //! [`Polygon::crossing`] weighs the roundings of both ends to answer as a device does; here a surface
 //! costs a few products, and four are asked at once. Surfaces become *facets*, which have grown by
@@ -34,6 +34,8 @@ pub struct Caster<'a> {
     facets: &'a Facets,
     /// What is left to look at, and how far away it is.
     waiting: Vec<(f32, Child)>,
+    /// The block that last stood between two points: it often stands between the next two as well.
+    blocker: u32,
 }
 
 impl<'a> Caster<'a> {
@@ -41,40 +43,36 @@ impl<'a> Caster<'a> {
         Self {
             facets,
             waiting: Vec::new(),
+            blocker: 0,
         }
     }
 
     /// The surface that a ray meets first.
     #[must_use]
     pub fn nearest(&mut self, from: Vec3, direction: Vec3) -> Option<Hit> {
-        let ray = Ray::new(from, direction);
-        self.first(&ray, direction, f32::INFINITY, false)
+        self.facets.nearest(from, direction, &mut self.waiting)
     }
 
-    /// True when no surface stands between two [`lifted`] points.
+    /// True when nothing lies between two points that are [`lifted`] off their surfaces. All others have
+    /// grown here, so less is seen past an edge than [`Polygon::crossing`] lets through.
     ///
     /// [`lifted`]: super::lifted
+    /// [`Polygon::crossing`]: relume::geometry::Polygon::crossing
     #[must_use]
     pub fn sees(&mut self, from: Vec3, to: Vec3) -> bool {
         let ray = Ray::new(from, to - from);
-        self.first(&ray, to - from, 1.0, true).is_none()
-    }
-
-    /// What a ray meets first before `farthest`, or, where any will do, what is found first.
-    fn first(&mut self, ray: &Ray, direction: Vec3, farthest: f32, any: bool) -> Option<Hit> {
-        let mut met = Met::nothing(farthest);
-        let facets = self.facets;
-        if facets.nodes.is_empty() {
-            for block in &facets.blocks {
-                block.meet(ray, &mut met);
-                if any && met.distance < farthest {
-                    break;
-                }
-            }
-        } else {
-            facets.descend(ray, direction, &mut met, any, &mut self.waiting);
+        if self.facets.is_blocked_by(self.blocker, &ray) {
+            return false;
         }
-        met.hit(farthest)
+        let blocker = self.facets.blocker(&ray, to - from, &mut self.waiting);
+        self.blocker = blocker.unwrap_or(self.blocker);
+        blocker.is_none()
+    }
+}
+
+impl std::fmt::Debug for Caster<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Caster").finish_non_exhaustive()
     }
 }
 
@@ -112,19 +110,13 @@ impl<'a> PointCaster<'a> {
         for (block, start) in self.caster.facets.blocks.iter().zip(&self.starts) {
             block.meet_from(start, direction, &mut met);
         }
-        met.hit(f32::INFINITY)
+        met.hit()
     }
 }
 
 impl std::fmt::Debug for PointCaster<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("PointCaster").finish_non_exhaustive()
-    }
-}
-
-impl std::fmt::Debug for Caster<'_> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Caster").finish_non_exhaustive()
     }
 }
 
@@ -186,17 +178,21 @@ impl Facets {
         Child::Node(number as u32)
     }
 
-    /// Puts what a ray meets first, or what is found first where any will do, in place of what is
-    /// farther.
-    fn descend(
-        &self,
-        ray: &Ray,
-        direction: Vec3,
-        met: &mut Met,
-        any: bool,
-        waiting: &mut Vec<(f32, Child)>,
-    ) {
-        let farthest = met.distance;
+    /// What a ray meets first.
+    fn nearest(&self, from: Vec3, direction: Vec3, waiting: &mut Vec<(f32, Child)>) -> Option<Hit> {
+        let ray = Ray::new(from, direction);
+        let mut met = Met::nothing(f32::INFINITY);
+        if self.nodes.is_empty() {
+            for block in &self.blocks {
+                block.meet(&ray, &mut met);
+            }
+        } else {
+            self.descend(&ray, direction, &mut met, waiting);
+        }
+        met.hit()
+    }
+
+    fn descend(&self, ray: &Ray, direction: Vec3, met: &mut Met, waiting: &mut Vec<(f32, Child)>) {
         let slabs = Slabs::new(ray, direction);
         waiting.clear();
         waiting.push((0.0, Child::Node(0)));
@@ -205,25 +201,38 @@ impl Facets {
                 continue;
             }
             match child {
-                Child::Block(block) => {
-                    self.blocks[block as usize].meet(ray, met);
-                    if any && met.distance < farthest {
-                        return;
-                    }
-                }
+                Child::Block(block) => self.blocks[block as usize].meet(ray, met),
                 Child::Node(node) => {
-                    let node = &self.nodes[node as usize];
-                    let (near, mut hits) = node.meet(&slabs, met.distance);
-                    let first = waiting.len();
-                    while hits != 0 {
-                        let lane = hits.trailing_zeros() as usize;
-                        hits &= hits - 1;
-                        waiting.push((near[lane], node.children[lane]));
-                        sort_last(&mut waiting[first..]);
-                    }
+                    self.nodes[node as usize].open(&slabs, met.distance, waiting);
                 }
             }
         }
+    }
+
+    /// A block that a ray meets within its length.
+    fn blocker(&self, ray: &Ray, direction: Vec3, waiting: &mut Vec<(f32, Child)>) -> Option<u32> {
+        if self.nodes.is_empty() {
+            return (0..self.blocks.len() as u32).find(|block| self.is_blocked_by(*block, ray));
+        }
+        let slabs = Slabs::new(ray, direction);
+        waiting.clear();
+        waiting.push((0.0, Child::Node(0)));
+        while let Some((_, child)) = waiting.pop() {
+            match child {
+                Child::Block(block) if self.is_blocked_by(block, ray) => return Some(block),
+                Child::Block(_) => {}
+                Child::Node(node) => self.nodes[node as usize].open(&slabs, 1.0, waiting),
+            }
+        }
+        None
+    }
+
+    fn is_blocked_by(&self, block: u32, ray: &Ray) -> bool {
+        let mut met = Met::nothing(1.0);
+        if let Some(block) = self.blocks.get(block as usize) {
+            block.meet(ray, &mut met);
+        }
+        met.is_surface()
     }
 }
 
@@ -288,6 +297,19 @@ impl Node {
         Self {
             bounds,
             children: [Child::Node(0); LANES],
+        }
+    }
+
+    /// Adds what is met before `farthest` to what waits, the nearest last.
+    #[inline]
+    fn open(&self, slabs: &Slabs, farthest: f32, waiting: &mut Vec<(f32, Child)>) {
+        let (near, mut hits) = self.meet(slabs, farthest);
+        let first = waiting.len();
+        while hits != 0 {
+            let lane = hits.trailing_zeros() as usize;
+            hits &= hits - 1;
+            waiting.push((near[lane], self.children[lane]));
+            sort_last(&mut waiting[first..]);
         }
     }
 
@@ -372,6 +394,9 @@ mod tests {
             for (from, direction) in rays {
                 let (from, direction) = (place(from), direction.normalize());
                 let hit = caster.nearest(from, direction);
+                // To as far as the scene is wide: what is nearest stands between, or nothing does.
+                let is_free = hit.is_none_or(|hit| hit.distance >= size);
+                prop_assert_eq!(caster.sees(from, from + direction * size), is_free, "{:?}", hit);
                 for (surface, number) in surfaces.iter().zip(0..) {
                     let polygon = surface.polygon();
                     let tolerance = 4.0 * f64::from(polygon.height(Vec3::splat(farthest)).1);

@@ -10,7 +10,7 @@
 //! stands on a floor, the elements under its edges are partly dark, and rays only meet the other
 //! part. Every element shoots, so there is no substructuring error, and
 //! work grows with the elements alone. The places on the receiver and the directions are a rank-one
-//! sequence in four dimensions (Roberts 2018, R4), shifted for every receiver by its number. From a point
+//! sequence in four dimensions ([`noise::STEPS`]), shifted for every receiver by its number. From a point
 //! a known number of rays leaves along a Fibonacci lattice, which is more even.
 
 mod file;
@@ -40,9 +40,6 @@ const DARK: u32 = u32::MAX - 1;
 
 /// Least share of an element that counts as reached by light: direct light is sampled at four points.
 const LEAST_EXPOSED: f32 = 0.25;
-
-/// `1/g, 1/g^2, 1/g^3, 1/g^4` with `g^5 = g + 1`, in parts of 2^32.
-const STEPS: [u32; 4] = [3_679_390_609, 3_152_041_523, 2_700_274_806, 2_313_257_605];
 
 /// `1/g` with `g^2 = g + 1`, in parts of 2^32.
 const GOLDEN_STEP: u32 = 2_654_435_769;
@@ -80,7 +77,7 @@ struct Step {
 
 impl Step {
     fn new(index: u32) -> Self {
-        let [s, t, share, turn] = STEPS.map(|step| index.wrapping_mul(step));
+        let [s, t, share, turn] = noise::STEPS.map(|step| index.wrapping_mul(step));
         Self {
             place: [s, t],
             share,

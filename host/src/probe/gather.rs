@@ -287,10 +287,10 @@ struct Path {
 
 /// The elements as rays find them.
 fn grounds(solution: &Solution) -> Vec<Ground> {
-    let elements = solution.mesh.elements.iter().zip(&solution.exposed);
-    let ground = |(element, exposed): (&Element, &f32)| Ground {
+    let elements = solution.mesh.elements.iter().enumerate();
+    let ground = |(id, element): (usize, &Element)| Ground {
         reflectance: element.reflectance,
-        exposed: element.reflectance * exposed.recip(),
+        exposed: element.reflectance * solution.exposed(id).recip(),
         size: element.area.sqrt(),
         patch: element.patch,
     };

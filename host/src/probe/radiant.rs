@@ -30,8 +30,8 @@ pub(super) fn radiant_patches(solution: &Solution) -> Vec<RadiantPatch> {
     let mesh = solution.mesh.view();
     let mut radiosities = vec![vec![Rgb::BLACK; solution.lights.len()]; mesh.patches.len()];
     let mut areas = vec![0.0; mesh.patches.len()];
-    for (element, exposed) in mesh.elements.iter().zip(&solution.exposed) {
-        areas[element.patch as usize] += element.area * exposed;
+    for (id, element) in mesh.elements.iter().enumerate() {
+        areas[element.patch as usize] += element.area * solution.exposed(id);
     }
     for (element, id) in mesh.elements.iter().zip(0..) {
         let patch = element.patch as usize;

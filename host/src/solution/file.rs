@@ -87,8 +87,7 @@ pub fn write(solution: &Solution) -> Vec<u8> {
     if solution.method != Method::Gather {
         flags |= HAS_ROWS;
     }
-    let has_dark = solution.exposed.iter().any(|share| *share < 1.0);
-    if has_dark {
+    if !solution.exposed.is_empty() {
         flags |= HAS_EXPOSED;
     }
     output.0.extend(VERSION.to_le_bytes());
@@ -123,7 +122,7 @@ pub fn write(solution: &Solution) -> Vec<u8> {
     {
         output.rgb(*value);
     }
-    if has_dark {
+    if !solution.exposed.is_empty() {
         output.f32s(&solution.exposed);
     }
     output.u32(CRC.checksum(&output.0));
@@ -269,7 +268,7 @@ pub fn read(bytes: &[u8]) -> Result<Solution, FileError> {
         Some(input.table("direct light", values, 12, Input::legal_rgb)?)
     };
     let exposed = if flags & HAS_EXPOSED == 0 {
-        vec![1.0; counts.elements]
+        Vec::new()
     } else {
         input.table("exposed shares", counts.elements, 4, |input| {
             let share = input.f32()?;
@@ -290,6 +289,7 @@ pub fn read(bytes: &[u8]) -> Result<Solution, FileError> {
         surfaces,
         luminaires,
         mesh,
+        image: None,
         lights,
         contributions,
         direct,
