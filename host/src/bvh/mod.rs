@@ -24,8 +24,8 @@ use relume::mesh::Side;
 use relume::scene::{Scene, Source, Surface};
 use relume::visibility::{Bounds, Shaft, Visibility};
 
-pub use nearest::{Caster, PointCaster};
 use nearest::Facets;
+pub use nearest::{Caster, PointCaster};
 
 /// Surfaces in a tree of boxes.
 pub struct Bvh {

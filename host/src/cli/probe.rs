@@ -9,11 +9,9 @@ use serde_json::json;
 use super::load::{Loaded, load, read};
 use super::{Outcome, keep, output_path, tell, write_file};
 use crate::probe::{
-    Part, ProbeError, Probed, RAYS, probe_elements, probe_gathered, probe_points, read_points,
+    MOST_RAYS, Part, ProbeError, Probed, RAYS, probe_elements, probe_gathered, probe_points,
+    read_points,
 };
-
-/// Most rays from a point.
-const MOST_RAYS: i64 = 1 << 20;
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -74,13 +72,7 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
         Some(file) => {
             let points = read_points(&read(file)?).with_context(|| file.display().to_string())?;
             if arguments.gather {
-                if !matches!(loaded, Loaded::Solution(_)) {
-                    bail!(
-                        "{}: an atlas does not keep what --gather needs; probe the solution that it \
-                         was packed from",
-                        arguments.input.display()
-                    );
-                }
+                let solution = loaded.to_gather(&arguments.input)?;
                 probe_gathered(solution, &points, part, arguments.rays).map_err(named)?
             } else {
                 probe_points(solution, &points, part).map_err(named)?

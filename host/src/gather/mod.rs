@@ -187,14 +187,7 @@ impl<'a> Rays<'a> {
     }
 
     /// Casts a ray for every step from an element, and notes where each ends.
-    fn cast(
-        &self,
-        polygon: &Polygon,
-        id: u32,
-        steps: &[Step],
-        dark: &DarkSides,
-        hits: &mut [u32],
-    ) {
+    fn cast(&self, polygon: &Polygon, id: u32, steps: &[Step], dark: &DarkSides, hits: &mut [u32]) {
         let [s, t, share, turn] = [0, 1, 2, 3].map(|axis| noise::bits(u64::from(id) * 4 + axis));
         let frame = Frame::new(polygon);
         let first = Vec2::from_angle(TAU * noise::fraction(turn));

@@ -78,6 +78,7 @@ impl Stage {
             surfaces: &self.surfaces,
             irradiance: &self.irradiance,
             exitance: &self.parts.faces.iter().map(exitance).collect::<Vec<_>>(),
+            gathered: None,
         };
         render(&relit, camera, brightest).unwrap()
     }
@@ -491,6 +492,7 @@ fn unlit_sides_hide_from_inside_and_vanish_from_outside() {
         surfaces: &[],
         irradiance: &stage.irradiance,
         exitance: &exitance,
+        gathered: None,
     };
     let view = camera(Vec3::Z * 1.9, Vec3::ZERO, 0.5, 9, 9);
     assert_eq!(render(&relit, &view, 1e9).unwrap(), inside);
@@ -533,6 +535,7 @@ fn wrong_lengths_are_refused() {
         surfaces: &stage.surfaces,
         irradiance: &[],
         exitance: &[Rgb::BLACK],
+        gathered: None,
     };
     let view = camera(Vec3::Z, Vec3::ZERO, 1.0, 4, 4);
     let error = render(&relit, &view, 1.0).unwrap_err().to_string();

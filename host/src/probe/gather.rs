@@ -13,6 +13,7 @@
 //! final gathering). Assumption: lamps radiate evenly from their front.
 
 use std::borrow::Cow;
+use std::fmt;
 
 use glam::Vec3;
 use relume::color::Rgb;
@@ -54,7 +55,7 @@ const INWARDS: f32 = 1e-5;
 const END_INWARDS: f32 = 1e-3;
 
 /// A solution, ready to be gathered from.
-pub(super) struct Gatherer<'a> {
+pub struct Gatherer<'a> {
     solution: &'a Solution,
     locator: Locator<'a>,
     bvh: Bvh,
@@ -65,6 +66,7 @@ pub(super) struct Gatherer<'a> {
     grounds: Vec<Ground>,
     /// Rays that are shorter than so many edges go on.
     short: f32,
+    /// By number, or none, if rays are to find them from afar, too.
     patches: Vec<RadiantPatch>,
     far: f32,
 }
@@ -81,6 +83,7 @@ struct Ground {
 
 impl<'a> Gatherer<'a> {
     /// Builds the tree of all surfaces, and chooses the directions of so many rays from every point.
+    #[must_use]
     pub fn new(solution: &'a Solution, rays: u32) -> Self {
         let outlines = solution.surfaces.iter().zip(0..);
         let surfaces: Vec<Surface> = outlines
@@ -102,7 +105,7 @@ impl<'a> Gatherer<'a> {
             direct,
             grounds: grounds(solution),
             short: (rays as f32 / RAYS_PER_SQUARE_EDGE).sqrt(),
-            patches: radiant_patches(solution),
+            patches: Vec::new(),
             bvh,
             lamps: faces
                 .filter_map(|face| Some(Lamp::new(face.polygon, face.emission?)))
@@ -111,7 +114,16 @@ impl<'a> Gatherer<'a> {
         }
     }
 
-    /// The point of a side nearest to a position.
+    /// The same with exact form factors of far patches instead of rays: slower by far, and better where
+    /// most of the light comes through small openings.
+    #[must_use]
+    pub fn with_exact_far_patches(mut self) -> Self {
+        self.patches = radiant_patches(self.solution);
+        self
+    }
+
+    /// The point of a side nearest to a position; `None` for a surface that there is not.
+    #[must_use]
     pub fn spot(&self, surface: u32, side: Side, position: Vec3) -> Option<Spot> {
         let outline = self.solution.surfaces.get(surface as usize)?;
         let outline = match side {
@@ -128,6 +140,7 @@ impl<'a> Gatherer<'a> {
     }
 
     /// Irradiance by every light at unit emission, W/m2; `seed` turns the rays.
+    #[must_use]
     pub fn irradiance(&self, spot: Spot, part: Part, seed: u64) -> Vec<Rgb> {
         let mut values = self.direct(spot);
         if part == Part::Total {
@@ -190,7 +203,7 @@ impl<'a> Gatherer<'a> {
     fn is_in_far_patch(&self, end: &End, from: Vec3) -> bool {
         let ground = self.grounds.get(end.element as usize);
         let patch = ground.and_then(|ground| self.patches.get(ground.patch as usize));
-        patch.is_none_or(|patch| patch.is_far(from))
+        patch.is_some_and(|patch| patch.is_far(from))
     }
 
     /// Adds what comes from the end of a ray.
@@ -272,6 +285,12 @@ impl<'a> Gatherer<'a> {
             let value = luminaire::at_point(source, position, normal, self.far, 1, &self.bvh);
             values[luminaire.light() as usize] += path.share * (share * value);
         }
+    }
+}
+
+impl fmt::Debug for Gatherer<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Gatherer").finish_non_exhaustive()
     }
 }
 

@@ -30,11 +30,11 @@ pub(super) const STEPS: [u32; 2] = [3_242_174_889, 2_447_445_414];
 
 /// A point on a side of a surface.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Spot {
-    pub position: Vec3,
-    pub normal: Vec3,
+pub struct Spot {
+    pub(super) position: Vec3,
+    pub(super) normal: Vec3,
     /// Its polygon, front towards the side.
-    pub outline: Polygon,
+    pub(super) outline: Polygon,
 }
 
 /// A face that emits.

@@ -20,7 +20,8 @@ use thiserror::Error;
 
 use crate::mesh::Locator;
 use crate::solution::Solution;
-use gather::Gatherer;
+pub use gather::Gatherer;
+pub use lamp::Spot;
 
 /// Reach of a surface, in diagonals of the bounding box.
 const REACH: f32 = 1e-3;
@@ -195,6 +196,9 @@ pub fn probe_points(
 /// Rays that gather light at a point, by default.
 pub const RAYS: u32 = 2048;
 
+/// Most of them.
+pub const MOST_RAYS: i64 = 1 << 20;
+
 /// The same, with direct light evaluated exactly at every point and indirect light gathered there by
 /// so many rays.
 ///
@@ -210,7 +214,7 @@ pub fn probe_gathered(
         return Err(ProbeError::NoMesh);
     }
     let places = Places::new(solution);
-    let gatherer = Gatherer::new(solution, rays);
+    let gatherer = Gatherer::new(solution, rays).with_exact_far_patches();
     let values: Vec<Option<Vec<Rgb>>> = points
         .par_iter()
         .enumerate()
