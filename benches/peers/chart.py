@@ -4,7 +4,7 @@ import math
 from html import escape
 
 WIDTH, HEIGHT = 330, 260
-LEFT, TOP, GAP, BOTTOM = 58, 34, 26, 78
+LEFT, TOP, GAP, BOTTOM = 58, 34, 48, 78
 X = (-3, 2)  # decades of seconds
 Y = (-3, -0.5)  # decades of error
 COLOURS = ["#0b6e4f", "#c1440e", "#3a5fa0"]
