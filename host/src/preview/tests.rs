@@ -205,6 +205,7 @@ fn a_dark_room_is_tight_too() {
         surfaces: &surfaces,
         irradiance: &[],
         exitance: &[],
+        gathered: None,
     };
     for step in 0..24_u8 {
         let angle = f32::from(step) * 0.53;
@@ -385,7 +386,7 @@ fn small_elements_meet_a_large_neighbour_without_a_step() {
     stage.irradiance = [1.0, 9.0, 4.0, 2.0, 7.0, 3.0].map(Rgb::splat).to_vec();
 
     let facets = shading::facets(&stage.mesh(), &stage.irradiance, &[Rgb::BLACK]);
-    let at = |element: usize, p: Vec3| facets[element].as_ref().unwrap().radiance(p).r;
+    let at = |element: usize, p: Vec3| facets[element].as_ref().unwrap().radiance(p, None, 0).r;
     for step in 0..=40_u8 {
         let y = f32::from(step) / 40.0;
         let right = match y {
