@@ -47,6 +47,7 @@ fn of_solution(solution: &Solution) -> Value {
         "element": solution.spacing.element,
         "shots": solution.rows,
         "method": solution.method.name(),
+        "rule": solution.method.rule(),
         "split_direct": solution.direct.is_some(),
         "lights": solution.lights.len(),
         "per_light": lights.collect::<Vec<_>>(),

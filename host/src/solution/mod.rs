@@ -35,6 +35,20 @@ impl Method {
             Self::Device => "device",
         }
     }
+
+    /// How visibility was found, and why so.
+    #[must_use]
+    pub const fn rule(self) -> &'static str {
+        match self {
+            Self::Gather => {
+                "lamps by exact form factors, by quarters of them where more than 32 polygons stand between; bounces by \
+                 cosine rays of every element, which at equal error took the least time at every size (`relume study accuracy`)"
+            }
+            Self::Rows | Self::Device => {
+                "lamps and patches by exact form factors, by 16 rays where more than 32 polygons stand between"
+            }
+        }
+    }
 }
 
 /// A light of a solution.
