@@ -15,7 +15,7 @@ use glam::{DVec3, Vec3};
 use relume::form_factor::{self, point_to_polygon};
 use relume::geometry::Polygon;
 use relume::mesh::Mesh;
-use relume::visibility::{Occluders, Shaft, Visibility};
+use relume::visibility::{Obstacle, Occluders, Shaft, Visibility};
 use relume_host::builtin::PaperLamps;
 use relume_host::bvh::Bvh;
 use relume_host::polygon_pair::{self, ConvexPolygon};
@@ -28,7 +28,7 @@ impl Visibility for Open {
         true
     }
 
-    fn between<'v>(&'v self, _: &Shaft, _: &mut impl FnMut(&'v Polygon)) {}
+    fn between<'v>(&'v self, _: &Shaft, _: &mut impl FnMut(Obstacle<'v>)) {}
 }
 
 fn main() {
@@ -55,7 +55,7 @@ fn rows(criterion: &mut Criterion) {
     let owned = scenes::meshed(&room);
     let mesh = owned.view();
     let (brute, bvh) = (
-        Occluders(&room.scene.surfaces),
+        Occluders::new(&room.scene.surfaces),
         Bvh::for_scene(&room.scene.view().expect("a legal scene")),
     );
     let mut row = vec![0.0; mesh.elements.len()];

@@ -50,7 +50,7 @@ fn bake_and_pack(flash: &mut [u8]) -> usize {
     refinement.set_choice(Choice::Power);
     let mut row = [0.0; ELEMENTS];
     while let Some(patch) = refinement.next_shooter() {
-        form_factor::row(&mesh, patch, &Occluders(surfaces), &mut row);
+        form_factor::row(&mesh, patch, &Occluders::new(surfaces), &mut row);
         refinement.shoot(patch, &row).expect("a legal row");
     }
 

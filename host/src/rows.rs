@@ -8,12 +8,12 @@ use std::ops::Range;
 
 use glam::Vec2;
 use rayon::prelude::*;
-use relume::form_factor::{self, Shooter};
+use relume::form_factor::{self, Receiver, Shooter};
 use relume::geometry::Polygon;
 use relume::luminaire;
 use relume::mesh::Mesh;
 use relume::scene::Luminaire;
-use relume::visibility::{Occluders, Shaft};
+use relume::visibility::{Occluders, Shaft, Visibility};
 
 use crate::bvh::{Bvh, Narrowed};
 
@@ -74,7 +74,9 @@ pub struct Parallel<'a> {
     bvh: &'a Bvh,
     /// Element numbers, patch by patch.
     elements: Vec<u32>,
-    /// Patches that have elements, with their ranges of the list above.
+    /// The same elements.
+    receivers: Vec<Receiver>,
+    /// Patches that have elements, with their ranges of the lists above.
     patches: Vec<(Polygon, Range<usize>)>,
 }
 
@@ -83,8 +85,12 @@ impl<'a> Parallel<'a> {
     #[must_use]
     pub fn new(mesh: &Mesh, bvh: &'a Bvh) -> Self {
         let patch_of = |element: &u32| mesh.elements[*element as usize].patch;
+        let outline = |element: &u32| mesh.element_polygon(&mesh.elements[*element as usize]);
         let mut elements: Vec<u32> = (0..mesh.elements.len() as u32).collect();
+        elements.retain(|element| outline(element).is_some());
         elements.sort_by_key(patch_of);
+        let receivers = elements.iter().filter_map(outline);
+        let receivers = receivers.map(Receiver::new).collect();
         let mut start = 0;
         let patches = elements
             .chunk_by(|a, b| patch_of(a) == patch_of(b))
@@ -97,6 +103,7 @@ impl<'a> Parallel<'a> {
         Self {
             bvh,
             elements,
+            receivers,
             patches,
         }
     }
@@ -112,16 +119,16 @@ impl RowFiller for Parallel<'_> {
             });
     }
 
-    fn shooter(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
+    fn shooter(&self, _: &Mesh, polygon: &Polygon, row: &mut [f32]) {
         let shooter = Shooter::new(*polygon);
         self.fill(row, |receiver, range| {
-            self.factors(mesh, &shooter, receiver, range)
+            self.factors(&shooter, receiver, range)
         });
     }
 
-    fn lamp(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
+    fn lamp(&self, _: &Mesh, polygon: &Polygon, row: &mut [f32]) {
         self.fill(row, |receiver, range| {
-            self.lamp_factors(mesh, polygon, receiver, range, 0)
+            self.lamp_factors(polygon, receiver, range, 0)
         });
     }
 }
@@ -142,25 +149,17 @@ impl Parallel<'_> {
     }
 
     /// Form factors of the elements of one patch; none where the shooter is out of sight.
-    fn factors(
-        &self,
-        mesh: &Mesh,
-        shooter: &Shooter,
-        receiver: &Polygon,
-        range: &Range<usize>,
-    ) -> Vec<f32> {
+    fn factors(&self, shooter: &Shooter, receiver: &Polygon, range: &Range<usize>) -> Vec<f32> {
         if shooter.is_out_of_sight(receiver) {
             return Vec::new();
         }
-        let narrowed = self.narrowed(shooter.polygon(), receiver);
-        self.element_factors(mesh, shooter, range, &narrowed)
+        self.element_factors(shooter, receiver, range, self.bvh)
     }
 
     /// The same; where much stands between, the lamp is quartered, so that less is in the way of each
     /// part.
     fn lamp_factors(
         &self,
-        mesh: &Mesh,
         lamp: &Polygon,
         receiver: &Polygon,
         range: &Range<usize>,
@@ -172,11 +171,11 @@ impl Parallel<'_> {
         }
         let narrowed = self.narrowed(lamp, receiver);
         if narrowed.blockers() <= MANY_BLOCKERS || depth == MOST_QUARTERINGS {
-            return self.element_factors(mesh, &shooter, range, &narrowed);
+            return self.element_factors(&shooter, receiver, range, &narrowed);
         }
         let mut sum = vec![0.0; range.len()];
         for quarter in quarters(lamp) {
-            let factors = self.lamp_factors(mesh, &quarter, receiver, range, depth + 1);
+            let factors = self.lamp_factors(&quarter, receiver, range, depth + 1);
             for (sum, factor) in sum.iter_mut().zip(factors) {
                 *sum += factor;
             }
@@ -192,16 +191,15 @@ impl Parallel<'_> {
 
     fn element_factors(
         &self,
-        mesh: &Mesh,
         shooter: &Shooter,
+        receiver: &Polygon,
         range: &Range<usize>,
-        visibility: &Narrowed,
+        visibility: &impl Visibility,
     ) -> Vec<f32> {
-        let elements = self.elements[range.clone()].iter();
-        elements
-            .filter_map(|element| mesh.elements.get(*element as usize))
-            .filter_map(|element| mesh.element_polygon(element))
-            .map(|receiver| shooter.form_factor(&receiver, visibility))
+        let view = shooter.seen_by(receiver, visibility);
+        let receivers = self.receivers[range.clone()].iter();
+        receivers
+            .map(|receiver| view.form_factor(receiver, visibility))
             .collect()
     }
 }

@@ -270,7 +270,8 @@ impl<'a> Meshed<'a> {
     ) -> Result<(Solution, Hits), BakeError> {
         let view = self.view()?;
         let parallel = |mesh: &Mesh| Parallel::new(mesh, &self.bvh);
-        let serial = |_: &Mesh| Serial(Occluders(view.surfaces()));
+        let occluders = Occluders::with_bodies(view.surfaces(), self.bvh.bodies());
+        let serial = |_: &Mesh| Serial(occluders);
         self.run(settings, watch, |job, mesh| match settings.method {
             Method::Gather if !settings.plain => bounce::gather(job, mesh, &self.bvh),
             Method::Gather | Method::Rows => without_hits(shoot::refine(job, mesh, parallel)),

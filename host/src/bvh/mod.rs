@@ -21,7 +21,7 @@ use obvhs::{Boundable, BvhBuildParams};
 use relume::geometry::Polygon;
 use relume::luminaire;
 use relume::scene::{Scene, Source, Surface};
-use relume::visibility::{Bounds, Shaft, Visibility};
+use relume::visibility::{Body, Bounds, Obstacle, Shaft, Visibility, bodies};
 
 pub use nearest::Caster;
 use nearest::Facets;
@@ -33,6 +33,9 @@ pub struct Bvh {
     polygons: Vec<Polygon>,
     /// Number of the surface of each outline.
     surfaces: Vec<u32>,
+    bodies: Vec<Body>,
+    /// Number of the body of each outline.
+    body_of: Vec<Option<usize>>,
     /// The same surfaces as rays meet them that look for the nearest.
     facets: Facets,
 }
@@ -107,13 +110,21 @@ impl Bvh {
         let mut build_time = Duration::ZERO;
         let tree = build_bvh2(&boxes, BvhBuildParams::very_slow_build(), &mut build_time);
         let order = tree.primitive_indices.clone();
+        let bodies: Vec<Body> = bodies(surfaces).collect();
+        let body_of = |surface: &u32| {
+            let after = bodies.partition_point(|body| body.surfaces().end <= *surface);
+            let body = bodies.get(after)?;
+            body.surfaces().contains(surface).then_some(after)
+        };
         Self {
+            body_of: order.iter().map(body_of).collect(),
             polygons: order
                 .iter()
                 .filter_map(|index| surfaces.get(*index as usize))
                 .map(|surface| *surface.polygon())
                 .collect(),
             surfaces: order,
+            bodies,
             tree,
             facets: Facets::new(surfaces, farthest),
         }
@@ -140,8 +151,14 @@ pub fn lifted(polygon: &Polygon, point: Vec3) -> Vec3 {
 }
 
 impl Bvh {
-    /// The surfaces that a shaft admits, as `(number, outline)` in the order of their numbers.
-    fn admitted(&self, shaft: &Shaft) -> Vec<(u32, &Polygon)> {
+    /// The closed convex bodies among the surfaces.
+    #[must_use]
+    pub fn bodies(&self) -> &[Body] {
+        &self.bodies
+    }
+
+    /// The surfaces that a shaft admits, with their numbers and in the order of these.
+    fn admitted(&self, shaft: &Shaft) -> Vec<(u32, Obstacle<'_>)> {
         let mut found = Vec::new();
         let mut waiting: Vec<usize> = Vec::with_capacity(64);
         waiting.extend((!self.tree.nodes.is_empty()).then_some(0));
@@ -157,11 +174,12 @@ impl Bvh {
             let first = node.first_index as usize;
             if node.is_leaf() {
                 let leaf = first..first + node.prim_count as usize;
-                let leaf = self.surfaces[leaf.clone()].iter().zip(&self.polygons[leaf]);
-                found.extend(
-                    leaf.filter(|(_, polygon)| shaft.admits(polygon))
-                        .map(|(surface, polygon)| (*surface, polygon)),
-                );
+                let admitted = leaf.filter(|index| shaft.admits(&self.polygons[*index]));
+                found.extend(admitted.map(|index| {
+                    let body = self.body_of[index].map(|body| &self.bodies[body]);
+                    let polygon = &self.polygons[index];
+                    (self.surfaces[index], Obstacle { polygon, body })
+                }));
             } else {
                 waiting.extend([first, first + 1]);
             }
@@ -176,7 +194,7 @@ impl Bvh {
         let found = self.admitted(shaft);
         Narrowed {
             bvh: self,
-            blockers: found.into_iter().map(|(_, polygon)| polygon).collect(),
+            blockers: found.into_iter().map(|(_, obstacle)| obstacle).collect(),
         }
     }
 }
@@ -185,7 +203,7 @@ impl Bvh {
 #[derive(Debug)]
 pub struct Narrowed<'a> {
     bvh: &'a Bvh,
-    blockers: Vec<&'a Polygon>,
+    blockers: Vec<Obstacle<'a>>,
 }
 
 impl Narrowed<'_> {
@@ -205,10 +223,10 @@ impl Visibility for Narrowed<'_> {
         !self.blockers.is_empty()
     }
 
-    fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(&'v Polygon)) {
+    fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(Obstacle<'v>)) {
         let blockers = self.blockers.iter().copied();
         blockers
-            .filter(|polygon| shaft.admits(polygon))
+            .filter(|obstacle| shaft.admits(obstacle.polygon))
             .for_each(visit);
     }
 }
@@ -223,9 +241,9 @@ impl Visibility for Bvh {
         })
     }
 
-    fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(&'v Polygon)) {
-        for (_, polygon) in self.admitted(shaft) {
-            visit(polygon);
+    fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(Obstacle<'v>)) {
+        for (_, obstacle) in self.admitted(shaft) {
+            visit(obstacle);
         }
     }
 }
@@ -271,7 +289,7 @@ mod tests {
             let triangles: Vec<_> = triangles.iter().map(|t| t.map(|v| v * size)).collect();
             let surfaces = surfaces(&triangles);
             let bvh = Bvh::new(&surfaces, 2.0 * size);
-            let brute = Occluders(&surfaces);
+            let brute = Occluders::new(&surfaces);
             for (from, to) in ends {
                 let (from, to) = (from * size, to * size);
                 prop_assert_eq!(bvh.sees(from, to), brute.sees(from, to), "{} {}", from, to);
@@ -289,7 +307,7 @@ mod tests {
                 Surface::new(0, &[o, o + u, o + u + v, o + v], Rgb::BLACK).unwrap()
             }).collect();
             let bvh = Bvh::new(&surfaces, 2.0);
-            let brute = Occluders(&surfaces);
+            let brute = Occluders::new(&surfaces);
             for &(x, y, z, w, axis) in &steps {
                 let from = Vec3::new(at(x), at(y), at(z)) * 0.75;
                 let mut to = from;
@@ -306,7 +324,7 @@ mod tests {
         ) {
             let surfaces = surfaces(&triangles);
             let bvh = Bvh::new(&surfaces, 2.0 * far);
-            let brute = Occluders(&surfaces);
+            let brute = Occluders::new(&surfaces);
             for (corner, direction) in ends {
                 // Just past an outline, where the tolerance of a far end decides.
                 let corner = triangles[corner / 3 % triangles.len()][corner % 3];

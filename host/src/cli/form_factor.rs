@@ -184,7 +184,7 @@ fn solver_factor(
         .collect::<Result<_, _>>()
         .map_err(|error| refused(&error))?;
     Ok(Estimate {
-        value: f64::from(shooter.form_factor(&receiver, &Occluders(&surfaces))),
+        value: f64::from(shooter.form_factor(&receiver, &Occluders::new(&surfaces))),
         error: f64::NAN,
     })
 }

@@ -6,7 +6,7 @@ use relume::geometry::Polygon;
 use relume::luminaire;
 use relume::mesh::Mesh;
 use relume::scene::{Luminaire, Surface};
-use relume::visibility::{Occluders, Shaft, Visibility};
+use relume::visibility::{Obstacle, Occluders, Shaft, Visibility};
 
 use crate::rows::RowFiller;
 use crate::study::system::System;
@@ -52,7 +52,7 @@ impl<V: Visibility> RowFiller for Kernel<'_, V> {
 }
 
 /// Nothing blocks, as before there was a way to tell (Goral et al. 1984).
-pub const UNOCCLUDED: Occluders = Occluders(&[]);
+pub const UNOCCLUDED: Occluders = Occluders::new(&[]);
 
 /// How far rays start from surfaces, whatever the scene's unit is (`RAY_EPSILON` of pbrt, first edition).
 pub const RAY_EPSILON: f32 = 1e-3;
@@ -85,7 +85,7 @@ impl Visibility for EpsilonRays<'_> {
         !polygons.any(|polygon| Self::meets(polygon, from, to))
     }
 
-    fn between<'v>(&'v self, _: &Shaft, _: &mut impl FnMut(&'v Polygon)) {}
+    fn between<'v>(&'v self, _: &Shaft, _: &mut impl FnMut(Obstacle<'v>)) {}
 }
 
 /// The same rows, all longer or shorter by a factor.

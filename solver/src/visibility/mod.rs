@@ -7,11 +7,25 @@
 //! Assumption: every surface blocks light from both sides; end points lie on surfaces or in free
 //! space. A surface that contains an end point (to within rounding) does not hide it.
 
+mod body;
+
 use glam::{Vec2, Vec3};
 use heapless::Vec;
 
 use crate::geometry::{Plane, Polygon};
 use crate::scene::Surface;
+
+pub use body::{Body, bodies};
+pub(crate) use body::FACES;
+
+/// A surface that may hide something.
+#[derive(Clone, Copy, Debug)]
+pub struct Obstacle<'v> {
+    /// Its outline.
+    pub polygon: &'v Polygon,
+    /// The body that it is a face of, which hides what each of its faces hides.
+    pub body: Option<&'v Body>,
+}
 
 /// Tells who stands between two points or two polygons.
 pub trait Visibility {
@@ -24,30 +38,53 @@ pub trait Visibility {
     }
 
     /// Visits every surface that [`Shaft::admits`], in the order of their numbers.
-    fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(&'v Polygon));
+    fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(Obstacle<'v>));
 }
 
 /// Every surface of a scene, asked one after the other: work grows with their number.
 #[derive(Clone, Copy, Debug)]
-pub struct Occluders<'a>(
-    /// The surfaces that block.
-    pub &'a [Surface],
-);
+pub struct Occluders<'a> {
+    surfaces: &'a [Surface],
+    bodies: &'a [Body],
+}
+
+impl<'a> Occluders<'a> {
+    /// Surfaces that block, each by itself.
+    #[must_use]
+    pub const fn new(surfaces: &'a [Surface]) -> Self {
+        Self::with_bodies(surfaces, &[])
+    }
+
+    /// Surfaces that block, and the [`bodies`] among them: what is hidden is the same but for
+    /// rounding, and found with less work.
+    #[must_use]
+    pub const fn with_bodies(surfaces: &'a [Surface], bodies: &'a [Body]) -> Self {
+        Self { surfaces, bodies }
+    }
+
+    fn body(&self, surface: u32) -> Option<&'a Body> {
+        self.bodies
+            .iter()
+            .find(|body| body.surfaces().contains(&surface))
+    }
+}
 
 impl Visibility for Occluders<'_> {
     fn sees(&self, from: Vec3, to: Vec3) -> bool {
         !self
-            .0
+            .surfaces
             .iter()
             .any(|surface| surface.polygon().crossing(from, to).is_some())
     }
 
-    fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(&'v Polygon)) {
-        self.0
-            .iter()
-            .map(Surface::polygon)
-            .filter(|polygon| shaft.admits(polygon))
-            .for_each(visit);
+    fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(Obstacle<'v>)) {
+        for (surface, number) in self.surfaces.iter().zip(0..) {
+            let polygon = surface.polygon();
+            if shaft.admits(polygon) {
+                let body = self.body(number);
+                visit(Obstacle { polygon, body });
+            }
+        }
     }
 }
 
@@ -198,9 +235,9 @@ impl Shaft {
                 height > tolerance
             })
         };
-        !self.misses(Bounds::of(surface))
+        self.is_cut_by(&surface.plane())
             && self.planes.iter().all(is_in_front)
-            && self.is_cut_by(&surface.plane())
+            && !self.misses(Bounds::of(surface))
     }
 
     /// True when the ends lie on both sides of a plane.
@@ -252,7 +289,7 @@ mod tests {
             Vec3::new(-1.0, 1.0, 0.0),
         ];
         let surfaces = [Surface::new(0, &plate, Rgb::BLACK).unwrap()];
-        let occluders = Occluders(&surfaces);
+        let occluders = Occluders::new(&surfaces);
         let (above, below) = (Vec3::Z, -Vec3::Z);
         assert!(!occluders.sees(above, below));
         assert!(!occluders.sees(below, above));

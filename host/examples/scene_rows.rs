@@ -1,0 +1,26 @@
+//! Scratch.
+use std::time::Instant;
+use std::io::Write;
+use relume_host::rows::{Parallel, RowFiller as _};
+fn main() {
+    let a: Vec<String> = std::env::args().collect();
+    let lights = std::path::PathBuf::from(&a[2]);
+    let scene = relume_host::import::load(std::path::Path::new(&a[1]), lights.exists().then_some(lights.as_path())).unwrap().scene;
+    let (p, e): (f32, f32) = (a[3].parse().unwrap(), a[4].parse().unwrap());
+    let n: usize = a[5].parse().unwrap();
+    let mut go = |_| std::ops::ControlFlow::Continue(());
+    let s = relume_host::bake::Meshed::new(&scene, Some(p), Some(e), &mut go).unwrap();
+    let mesh = s.mesh().view();
+    let filler = Parallel::new(&mesh, s.bvh());
+    let mut row = vec![0.0; mesh.elements.len()];
+    let count = mesh.patches.len();
+    let step = (count / n.max(1)).max(1);
+    let mut all: Vec<f32> = vec![];
+    let t = Instant::now();
+    let mut rows = 0;
+    for p in (0..count).step_by(step) { filler.patch(&mesh, p as u32, &mut row); rows += 1; all.extend(&row); }
+    let s = t.elapsed().as_secs_f64();
+    println!("{} patches {} elements, {} rows: {:.3} ms a row", count, mesh.elements.len(), rows, s * 1e3 / rows as f64);
+    let mut f = std::fs::File::create(&a[6]).unwrap();
+    for v in &all { f.write_all(&v.to_le_bytes()).unwrap(); }
+}
