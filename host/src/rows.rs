@@ -8,14 +8,14 @@ use std::ops::Range;
 
 use glam::Vec2;
 use rayon::prelude::*;
-use relume::form_factor::{self, Receiver, Shooter};
+use relume::form_factor::{self, Receiver, Shooter, View};
 use relume::geometry::Polygon;
 use relume::luminaire;
 use relume::mesh::Mesh;
 use relume::scene::Luminaire;
-use relume::visibility::{Occluders, Shaft, Visibility};
+use relume::visibility::{Occluders, Shaft};
 
-use crate::bvh::{Bvh, Narrowed};
+use crate::bvh::Bvh;
 
 /// Receivers of direct light that one task fills.
 const CHUNK: usize = 64;
@@ -150,10 +150,8 @@ impl Parallel<'_> {
 
     /// Form factors of the elements of one patch; none where the shooter is out of sight.
     fn factors(&self, shooter: &Shooter, receiver: &Polygon, range: &Range<usize>) -> Vec<f32> {
-        if shooter.is_out_of_sight(receiver) {
-            return Vec::new();
-        }
-        self.element_factors(shooter, receiver, range, self.bvh)
+        let view = shooter.seen_by(receiver, self.bvh);
+        self.element_factors(&view, receiver, range)
     }
 
     /// The same; where much stands between, the lamp is quartered, so that less is in the way of each
@@ -166,12 +164,10 @@ impl Parallel<'_> {
         depth: u32,
     ) -> Vec<f32> {
         let shooter = Shooter::new(*lamp);
-        if shooter.is_out_of_sight(receiver) {
-            return Vec::new();
-        }
-        let narrowed = self.narrowed(lamp, receiver);
-        if narrowed.blockers() <= MANY_BLOCKERS || depth == MOST_QUARTERINGS {
-            return self.element_factors(&shooter, receiver, range, &narrowed);
+        let view = shooter.seen_by(receiver, self.bvh);
+        let is_simple = view.blockers().is_some_and(|count| count <= MANY_BLOCKERS);
+        if is_simple || depth == MOST_QUARTERINGS {
+            return self.element_factors(&view, receiver, range);
         }
         let mut sum = vec![0.0; range.len()];
         for quarter in quarters(lamp) {
@@ -183,24 +179,18 @@ impl Parallel<'_> {
         sum
     }
 
-    fn narrowed(&self, shooter: &Polygon, receiver: &Polygon) -> Narrowed<'_> {
-        let margin = ROUNDINGS * largest_coordinate(&[*shooter, *receiver]);
-        let shaft = Shaft::with_margin(receiver, shooter, margin);
-        self.bvh.narrowed(&shaft)
-    }
-
-    fn element_factors(
-        &self,
-        shooter: &Shooter,
-        receiver: &Polygon,
-        range: &Range<usize>,
-        visibility: &impl Visibility,
-    ) -> Vec<f32> {
-        let view = shooter.seen_by(receiver, visibility);
+    fn element_factors(&self, view: &View, receiver: &Polygon, range: &Range<usize>) -> Vec<f32> {
+        if view.is_hidden() {
+            return Vec::new();
+        }
         let receivers = self.receivers[range.clone()].iter();
-        receivers
-            .map(|receiver| view.form_factor(receiver, visibility))
-            .collect()
+        if view.blockers().is_some() {
+            return receivers.map(|r| view.form_factor(r, self.bvh)).collect();
+        }
+        let margin = ROUNDINGS * largest_coordinate(&[*view.shooter().polygon(), *receiver]);
+        let shaft = Shaft::with_margin(receiver, view.shooter().polygon(), margin);
+        let narrowed = self.bvh.narrowed(&shaft);
+        receivers.map(|r| view.form_factor(r, &narrowed)).collect()
     }
 }
 

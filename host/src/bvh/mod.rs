@@ -206,14 +206,6 @@ pub struct Narrowed<'a> {
     blockers: Vec<Obstacle<'a>>,
 }
 
-impl Narrowed<'_> {
-    /// How many there are.
-    #[must_use]
-    pub const fn blockers(&self) -> usize {
-        self.blockers.len()
-    }
-}
-
 impl Visibility for Narrowed<'_> {
     fn sees(&self, from: Vec3, to: Vec3) -> bool {
         self.bvh.sees(from, to)

@@ -49,26 +49,16 @@ pub(super) fn lambert(normal: Vec3, outline: &[Vectors]) -> Numbers {
         let shrink_b = shrink(b);
         let scale = shrink_a * shrink_b;
         // The edge itself is known better than the difference of two long products.
-        let cross = a.cross(*b - a) * scale;
+        let sine = a.cross(*b - a) * scale;
         let cosine = a.dot(*b) * scale;
-        sum = sum + cross.dot(normal) * angle_over_sine(cosine, cross);
+        let mut ratio = cosine.map(|x| math::angle_over_sine(x.abs()));
+        if Numbers::ZERO.above(cosine) != 0 {
+            let straight = sine.dot(sine).map(|square| PI * math::reciprocal_sqrt(square));
+            ratio = ratio.if_negative(cosine, straight - ratio);
+        }
+        sum = sum + sine.dot(normal) * ratio;
         (a, shrink_a) = (*b, shrink_b);
     }
     // Counter-clockwise from its front is clockwise for who looks along his own normal.
     sum * Numbers::all(-0.5 / PI)
-}
-
-/// The angle between two unit vectors over its sine, by their products.
-#[inline(always)]
-fn angle_over_sine(cosine: Numbers, cross: Vectors) -> Numbers {
-    let acute = cosine.map(|x| math::angle_over_sine(x.abs()));
-    if Numbers::ZERO.above(cosine) == 0 {
-        return acute;
-    }
-    let straight = cross.dot(cross).map(|square| PI * math::reciprocal_sqrt(square));
-    let obtuse = straight - acute;
-    let Numbers([a, b, c, d]) = cosine;
-    let pick = |cosine: f32, obtuse, acute| if cosine < 0.0 { obtuse } else { acute };
-    let (Numbers([e, f, g, h]), Numbers([i, j, k, l])) = (obtuse, acute);
-    Numbers([pick(a, e, i), pick(b, f, j), pick(c, g, k), pick(d, h, l)])
 }

@@ -74,6 +74,14 @@ impl Numbers {
         self.which(other, |a, b| a >= b)
     }
 
+    /// Another number where `sign` is below zero.
+    #[inline(always)]
+    pub fn if_negative(self, sign: Self, other: Self) -> Self {
+        let [[a, b, c, d], [e, f, g, h], [i, j, k, l]] = [sign.0, other.0, self.0];
+        let pick = |sign, other, own| if sign < 0.0 { other } else { own };
+        Self([pick(a, e, i), pick(b, f, j), pick(c, g, k), pick(d, h, l)])
+    }
+
     /// Zero outside of some lanes.
     pub fn within(self, lanes: Mask) -> Self {
         let [a, b, c, d] = self.0;

@@ -22,7 +22,7 @@ use glam::{Vec2, Vec3};
 use heapless::Vec;
 
 use crate::geometry::{Polygon, SamplePoint, from_unit_square};
-use crate::mesh::Mesh;
+use crate::mesh::{Element, Mesh};
 use crate::visibility::Visibility;
 
 pub use lambert::point_to_polygon;
@@ -136,17 +136,38 @@ pub fn fill(
     row: &mut [f32],
 ) {
     let elements = mesh.elements.get(first as usize..).unwrap_or_default();
-    row.fill(0.0);
-    let mut factors = row.iter_mut();
-    for elements in elements.chunk_by(|a, b| a.patch == b.patch) {
-        let patch = elements.first().and_then(|e| mesh.patch_polygon(e.patch));
-        let view = patch.map(|patch| shooter.seen_by(&patch, visibility));
-        for (element, factor) in elements.iter().zip(&mut factors) {
-            let (Some(view), Some(receiver)) = (&view, mesh.element_polygon(element)) else {
-                continue;
-            };
-            *factor = view.form_factor(&Receiver::new(receiver), visibility);
+    row.fill(f32::NAN);
+    for (element, start) in elements.iter().zip(0..row.len()) {
+        if row.get(start).is_some_and(|factor| factor.is_nan()) {
+            let rest = elements.iter().zip(row.iter_mut()).skip(start);
+            fill_patch(mesh, shooter, element.patch, visibility, rest);
         }
+    }
+    for factor in row.iter_mut().skip(elements.len()) {
+        *factor = 0.0;
+    }
+}
+
+/// Fills in the elements of one patch, which stand near each other.
+fn fill_patch<'e>(
+    mesh: &Mesh,
+    shooter: &Shooter,
+    patch: u32,
+    visibility: &impl Visibility,
+    elements: impl Iterator<Item = (&'e Element, &'e mut f32)>,
+) {
+    let view = mesh.patch_polygon(patch).map(|polygon| shooter.seen_by(&polygon, visibility));
+    let view = view.filter(|view| !view.is_hidden());
+    let end = mesh.patches.get(patch as usize).map_or(0.0, |patch| patch.from.y.max(patch.to.y));
+    // Parameters grow along `t`: the patch's elements have been met when another one's are beyond its end.
+    let is_near = |element: &Element| element.patch == patch || element.from.y.min(element.to.y) < end;
+    let elements = elements.take_while(|(element, _)| is_near(element));
+    for (element, factor) in elements.filter(|(element, _)| element.patch == patch) {
+        let receiver = mesh.element_polygon(element).map(Receiver::new);
+        *factor = match (&view, receiver) {
+            (Some(view), Some(receiver)) => view.form_factor(&receiver, visibility),
+            _ => 0.0,
+        };
     }
 }
 

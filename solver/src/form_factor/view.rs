@@ -14,7 +14,7 @@ use crate::geometry::{Plane, Polygon, SamplePoint, clip, gauss_points};
 use crate::visibility::{Body, Obstacle, Shaft, Visibility};
 
 /// Most surfaces that may stand between a receiver and a shooter to be cut out exactly.
-const BLOCKERS: usize = 32;
+const BLOCKERS: usize = 48;
 
 /// An element with the points that stand for it.
 #[derive(Clone, Debug)]
@@ -34,7 +34,7 @@ impl Receiver {
         let points = gauss_points(&polygon);
         let point = |index| points.get(index).copied();
         let of = [point(0), point(1), point(2), point(3)];
-        let position = |point: Option<SamplePoint>| point.map_or(polygon.center(), |p| p.position);
+        let position = |point: Option<SamplePoint>| point.map_or_else(|| polygon.center(), |p| p.position);
         let points = Vectors::new(of.map(position));
         Self {
             polygon,
@@ -148,17 +148,36 @@ impl<'s> View<'s> {
                 }
             });
             if is_hidden {
-                return Self::nothing(shooter, plane);
+                view.outline.clear();
             }
         }
         view
+    }
+
+    /// Who shoots.
+    #[must_use]
+    pub const fn shooter(&self) -> &'s Shooter {
+        self.shooter
+    }
+
+    /// How many surfaces and bodies may hide a part of the shooter; `None` for more than can be cut out for all
+    /// of the receiver at once.
+    #[must_use]
+    pub fn blockers(&self) -> Option<usize> {
+        self.is_exact.then_some(self.blockers.len())
+    }
+
+    /// True where nothing of the shooter can be seen from anywhere on the receiver.
+    #[must_use]
+    pub fn is_hidden(&self) -> bool {
+        self.outline.is_empty()
     }
 
     /// `F_ji` of the receiver, or of a part of it: what its points see of the shooter, averaged over its
     /// area. In [0, 1].
     #[must_use]
     pub fn form_factor(&self, receiver: &Receiver, visibility: &impl Visibility) -> f32 {
-        if self.outline.is_empty() {
+        if self.is_hidden() {
             return 0.0;
         }
         if !self.is_exact {

@@ -25,17 +25,17 @@ use crate::geometry::{Plane, Polygon};
 use crate::visibility::{Body, FACES};
 
 /// Most cones that may overlap at a place.
-const DEPTH: usize = 8;
+const DEPTH: usize = 6;
 
 /// Share of a polygon below which what is left of it is rounding: blockers that share an edge leave
 /// slivers between their pyramids.
 const SLIVER: f32 = 2e-6;
 
 /// Most blockers that really hide something from one receiver.
-const CONES: usize = 16;
+const CONES: usize = 32;
 
 /// Most planes that bound their shadows together.
-const PLANES: usize = 64;
+const PLANES: usize = 128;
 
 /// What hides, in front of the seen polygon's plane.
 #[derive(Clone, Debug)]
@@ -114,17 +114,24 @@ struct Cones {
     ends: Vec<usize, CONES>,
 }
 
-/// In which lanes a piece is partly inside of a cone, and in which wholly.
+/// How a piece lies to a cone.
+#[derive(Clone, Copy, Default)]
 struct Shade {
+    /// Lanes in which it is partly inside.
     some: Mask,
+    /// Lanes in which it is wholly inside.
     all: Mask,
+    /// The planes of the cone that cut it: one bit for each.
+    cut_by: u32,
 }
 
 impl Cones {
-    const EMPTY: Self = Self {
-        planes: Vec::new(),
-        ends: Vec::new(),
-    };
+    fn new() -> Self {
+        Self {
+            planes: Vec::new(),
+            ends: Vec::new(),
+        }
+    }
 
     /// Adds the cones of a blocker; tells in which lanes it is seen as more than a line.
     fn add(&mut self, blocker: &Blocker, points: &Points) -> Option<Mask> {
@@ -175,9 +182,13 @@ impl Cones {
     }
 }
 
-fn shade(planes: &[(Vectors, Mask)], piece: &Outline, lanes: Mask) -> Shade {
+fn shade(planes: &[(Vectors, Mask)], piece: &[Vectors], lanes: Mask) -> Shade {
+    let mut shade = Shade::default();
     let (mut touches, mut crosses) = (lanes, 0);
-    for (plane, bounds) in planes {
+    if lanes == 0 {
+        return shade;
+    }
+    for ((plane, bounds), number) in planes.iter().zip(0..) {
         let (mut highest, mut lowest) = (Numbers::all(f32::MIN), Numbers::all(f32::MAX));
         for v in piece {
             let height = plane.dot(*v);
@@ -185,68 +196,69 @@ fn shade(planes: &[(Vectors, Mask)], piece: &Outline, lanes: Mask) -> Shade {
             lowest = lowest.min(height);
         }
         touches &= highest.above(Numbers::ZERO) | !bounds;
-        crosses |= Numbers::ZERO.above(lowest);
         if touches == 0 {
-            break;
+            return shade;
         }
+        let cut = Numbers::ZERO.above(lowest);
+        crosses |= cut;
+        shade.cut_by |= u32::from(cut != 0) << number;
     }
-    Shade {
-        some: touches & crosses,
-        all: touches & !crosses,
-    }
+    shade.some = touches & crosses;
+    shade.all = touches & !crosses;
+    shade
 }
 
 /// What a piece shares with a cone in those of some lanes in which every cut meets the same edges
 /// as in the first of them; in which it does.
 fn share<'b>(
     planes: &[(Vectors, Mask)],
-    piece: &Outline,
+    cut_by: u32,
+    piece: &[Vectors],
     lanes: Mask,
     [mut part, mut spare]: [&'b mut Outline; 2],
 ) -> Option<(&'b Outline, Mask)> {
-    let first = lanes.trailing_zeros();
-    let mut alike = lanes;
-    part.clear();
-    part.extend_from_slice(piece).ok()?;
-    for (plane, _) in planes {
-        let mut heights = Vec::<Numbers, CORNERS>::new();
-        let (mut insides, mut corner) = (0_u32, 1);
-        for v in part.iter() {
-            let height = plane.dot(*v);
-            let inside = height.at_least(Numbers::ZERO);
-            let is_inside = inside >> first & 1 == 1;
-            alike &= if is_inside { inside } else { !inside };
-            insides |= if is_inside { corner } else { 0 };
-            corner <<= 1;
-            heights.push(height).ok()?;
-        }
-        if insides + 1 == corner {
-            continue;
-        }
-        spare.clear();
-        let (Some(mut a), Some(mut height_a)) = (part.last(), heights.last()) else {
-            break;
-        };
-        let mut a_inside = insides & corner >> 1 != 0;
-        for (b, height_b) in part.iter().zip(&heights) {
-            let b_inside = insides & 1 == 1;
-            insides >>= 1;
-            if a_inside != b_inside {
-                let at = *height_a / (*height_a - *height_b);
-                spare.push(*a + (*b - *a) * at).ok()?;
-            }
-            if b_inside {
-                spare.push(*b).ok()?;
-            }
-            (a, height_a, a_inside) = (b, height_b, b_inside);
-        }
+    let (mut alike, mut is_whole) = (lanes, true);
+    let cutting = planes.iter().zip(0..);
+    for ((plane, _), _) in cutting.filter(|(_, number)| cut_by >> number & 1 == 1) {
+        let from = if is_whole { piece } else { &*part };
+        alike = cut(from, plane, alike, spare)?;
         swap(&mut part, &mut spare);
-        if part.len() < 3 {
-            part.clear();
-            break;
-        }
+        is_whole = false;
     }
     Some((part, alike))
+}
+
+/// The part of a piece on the inner side of a plane, for those of some lanes in which the same corners
+/// are inside as in the first of them: these lanes.
+fn cut(piece: &[Vectors], plane: &Vectors, lanes: Mask, part: &mut Outline) -> Option<Mask> {
+    let first = lanes.trailing_zeros();
+    let mut alike = lanes;
+    let mut heights = Vec::<(Numbers, bool), CORNERS>::new();
+    for v in piece {
+        let height = plane.dot(*v);
+        let inside = height.at_least(Numbers::ZERO);
+        let is_inside = inside >> first & 1 == 1;
+        alike &= if is_inside { inside } else { !inside };
+        heights.push((height, is_inside)).ok()?;
+    }
+    part.clear();
+    let corners = piece.iter().zip(&heights);
+    let Some((mut a, mut at_a)) = corners.clone().next_back() else {
+        return Some(alike);
+    };
+    for (b, at_b) in corners {
+        if at_a.1 != at_b.1 {
+            part.push(*a + (*b - *a) * (at_a.0 / (at_a.0 - at_b.0))).ok()?;
+        }
+        if at_b.1 {
+            part.push(*b).ok()?;
+        }
+        (a, at_a) = (b, at_b);
+    }
+    if part.len() < 3 {
+        part.clear();
+    }
+    Some(alike)
 }
 
 /// How much a blocker hides of an outline from all points between some corners.
@@ -262,7 +274,7 @@ pub(super) enum Hides {
 pub(super) fn hides(blocker: &Blocker, corners: &Points, outline: &[Vec3]) -> Hides {
     let seen = outline.iter().map(|v| Vectors::all(*v) - corners.relative);
     let piece: Outline = seen.collect();
-    let mut cones = Cones::EMPTY;
+    let mut cones = Cones::new();
     let is_seen_alike = |plane: &Plane| {
         let (height, tolerance) = corners.height(plane);
         [0, ALL].contains(&height.above(tolerance))
@@ -306,8 +318,8 @@ pub(super) fn visible_factors(
 ) -> Option<Numbers> {
     let seen = outline.iter().map(|v| Vectors::all(*v) - points.relative);
     let piece: Outline = seen.collect();
-    let mut cones = Cones::EMPTY;
-    let (mut lit, mut cuts) = (ALL, [0; CONES]);
+    let mut cones = Cones::new();
+    let (mut lit, mut cuts) = (ALL, Vec::new());
     for blocker in blockers {
         let first = cones.planes.len();
         let lanes = cones.add(blocker, points)?;
@@ -319,7 +331,7 @@ pub(super) fn visible_factors(
         if shade.some == 0 {
             cones.planes.truncate(first);
         } else {
-            *cuts.get_mut(cones.ends.len())? = shade.some;
+            cuts.push(shade).ok()?;
             cones.ends.push(cones.planes.len()).ok()?;
         }
     }
@@ -329,41 +341,41 @@ pub(super) fn visible_factors(
     Some(seen.within(lit))
 }
 
-/// `sum_k V(Q and C_k, k + 1)` of the lit lanes of a piece `Q`, `cuts` being the lanes in which cone
-/// `C_k` cuts it.
+/// `sum_k V(Q and C_k, k + 1)` of the lit lanes of a piece `Q`, `cuts` telling how it lies to
+/// the cones `C_k`.
 fn hidden(
     cones: &Cones,
     normal: Vec3,
-    piece: &Outline,
+    piece: &[Vectors],
     lit: Mask,
-    cuts: &[Mask; CONES],
+    cuts: &Vec<Shade, CONES>,
     depth: usize,
 ) -> Option<Numbers> {
     let mut sum = Numbers::ZERO;
     let (mut one, mut other) = (Outline::new(), Outline::new());
     for (cone, cut) in cuts.iter().enumerate() {
-        let mut waiting = cut & lit;
+        let mut waiting = cut.some & lit;
         while waiting != 0 {
-            let (part, alike) = share(cones.planes(cone), piece, waiting, [&mut one, &mut other])?;
+            let buffers = [&mut one, &mut other];
+            let (part, alike) = share(cones.planes(cone), cut.cut_by, piece, waiting, buffers)?;
             waiting &= !alike;
             if part.is_empty() {
                 continue;
             }
-            let (mut lit, mut later) = (alike, [0; CONES]);
-            let cuts = cuts.iter().zip(&mut later).enumerate().skip(cone + 1);
-            for (cone, (cut, later)) in cuts {
-                if cut & lit != 0 {
-                    let shade = shade(cones.planes(cone), part, cut & lit);
-                    lit &= !shade.all;
-                    *later = shade.some;
-                }
+            let (mut lit, mut later, mut is_cut) = (alike, Vec::new(), false);
+            for (other, cut) in cuts.iter().enumerate() {
+                let lanes = if other > cone { cut.some & lit } else { 0 };
+                let shade = shade(cones.planes(other), part, lanes);
+                lit &= !shade.all;
+                is_cut |= shade.some != 0;
+                later.push(shade).ok()?;
             }
             if lit != 0 {
                 let open = lambert(normal, part);
-                let hidden = if later == [0; CONES] {
-                    Numbers::ZERO
-                } else {
+                let hidden = if is_cut {
                     hidden(cones, normal, part, lit, &later, depth.checked_sub(1)?)?
+                } else {
+                    Numbers::ZERO
                 };
                 sum = sum + (open - hidden).within(lit);
             }
