@@ -12,6 +12,10 @@ pub fn fraction(parts: u32) -> f32 {
     (parts >> 8) as f32 / (1_u32 << 24) as f32
 }
 
+/// `1/g, 1/g^2, 1/g^3, 1/g^4` with `g^5 = g + 1`, in parts of 2^32: multiples of them fill four dimensions
+/// evenly (Roberts 2018, R4).
+pub const STEPS: [u32; 4] = [3_679_390_609, 3_152_041_523, 2_700_274_806, 2_313_257_605];
+
 /// Bits for every seed: SplitMix64 (Steele, Lea and Flood 2014), the top ones.
 #[must_use]
 pub fn bits(seed: u64) -> u32 {

@@ -8,14 +8,16 @@ use std::ops::Range;
 
 use glam::Vec2;
 use rayon::prelude::*;
-use relume::form_factor::{self, Receiver, Shooter, View};
-use relume::geometry::Polygon;
+use relume::form_factor::{self, Receiver, Shooter};
+use relume::geometry::{Polygon, from_unit_square};
 use relume::luminaire;
 use relume::mesh::Mesh;
-use relume::scene::Luminaire;
-use relume::visibility::{Occluders, Shaft};
+use relume::refine::Refinement;
+use relume::scene::{Luminaire, Scene};
+use relume::visibility::{Occluders, Shaft, Visibility};
 
-use crate::bvh::Bvh;
+use crate::bvh::{Bvh, Narrowed, lifted};
+use crate::noise;
 
 /// Receivers of direct light that one task fills.
 const CHUNK: usize = 64;
@@ -29,8 +31,16 @@ const MANY_BLOCKERS: usize = 12;
 /// How often a lamp is quartered at most.
 const MOST_QUARTERINGS: u32 = 3;
 
+/// Rays that look for a way from a patch to a lamp behind so many, and for each element at least; a quarter of
+/// them to a part of the lamp. A share `v` that is seen is missed with a chance of `(1 - v)^256`.
+const RAYS_TO_LAMP: u32 = 256;
+const RAYS_PER_ELEMENT: u32 = 64;
+
 /// Fills rows.
 pub trait RowFiller {
+    /// Who sees whom.
+    fn visibility(&self) -> &impl Visibility;
+
     /// Direct irradiance of every element by a luminaire at unit emission, W/m2.
     fn luminaire(&self, mesh: &Mesh, luminaire: &Luminaire, far: f32, row: &mut [f32]);
 
@@ -49,6 +59,44 @@ pub trait RowFiller {
     fn lamp(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
         self.shooter(mesh, polygon, row);
     }
+
+    /// Estimates of the form factors from every element to a polygon.
+    fn estimate(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
+        let shooter = Shooter::new(*polygon);
+        form_factor::estimate(mesh, &shooter, 0, self.visibility(), row);
+    }
+}
+
+/// Estimates the rows that a refinement misses ([`Refinement::close`]) and solves with them.
+///
+/// Where there is no room for all rows nothing changes.
+pub fn close<const K: usize>(
+    refinement: &mut Refinement<K>,
+    mesh: &Mesh,
+    scene: &Scene,
+    filler: &impl RowFiller,
+) {
+    let is_closed = luminaire::is_closed(mesh, luminaire::far(scene), filler.visibility());
+    let dark = is_closed.then(|| dark_shares(mesh, scene, filler));
+    refinement.close(dark.as_deref(), |patch, row| {
+        if let Some(polygon) = mesh.patch_polygon(patch) {
+            filler.estimate(mesh, &polygon, row);
+        }
+    });
+    refinement.finish();
+}
+
+/// What share of every element's view has no patches.
+fn dark_shares(mesh: &Mesh, scene: &Scene, filler: &impl RowFiller) -> Vec<f32> {
+    let mut dark = vec![0.0; mesh.elements.len()];
+    let mut row = dark.clone();
+    for side in mesh.dark_sides(scene.surfaces()) {
+        filler.estimate(mesh, &side, &mut row);
+        for (sum, factor) in dark.iter_mut().zip(&row) {
+            *sum += factor;
+        }
+    }
+    dark
 }
 
 /// The solver alone, by brute force: what a device does.
@@ -59,6 +107,10 @@ pub struct Serial<'a>(
 );
 
 impl RowFiller for Serial<'_> {
+    fn visibility(&self) -> &impl Visibility {
+        &self.0
+    }
+
     fn luminaire(&self, mesh: &Mesh, luminaire: &Luminaire, far: f32, row: &mut [f32]) {
         luminaire::fill(mesh, luminaire, far, 0, &self.0, row);
     }
@@ -110,6 +162,10 @@ impl<'a> Parallel<'a> {
 }
 
 impl RowFiller for Parallel<'_> {
+    fn visibility(&self) -> &impl Visibility {
+        self.bvh
+    }
+
     fn luminaire(&self, mesh: &Mesh, luminaire: &Luminaire, far: f32, row: &mut [f32]) {
         row.par_chunks_mut(CHUNK)
             .enumerate()
@@ -122,13 +178,31 @@ impl RowFiller for Parallel<'_> {
     fn shooter(&self, _: &Mesh, polygon: &Polygon, row: &mut [f32]) {
         let shooter = Shooter::new(*polygon);
         self.fill(row, |receiver, range| {
-            self.factors(&shooter, receiver, range)
+            if shooter.is_out_of_sight(receiver) {
+                return Vec::new();
+            }
+            let narrowed = self.bvh.narrowed(&shaft(polygon, receiver));
+            self.factors(&shooter, receiver, range, &narrowed)
+        });
+    }
+
+    fn estimate(&self, _: &Mesh, polygon: &Polygon, row: &mut [f32]) {
+        let shooter = Shooter::new(*polygon);
+        self.fill(row, |receiver, range| {
+            if shooter.is_out_of_sight(receiver) {
+                return Vec::new();
+            }
+            let narrowed = self.bvh.narrowed(&shaft(polygon, receiver));
+            let receivers = self.receivers[range.clone()].iter();
+            receivers
+                .map(|receiver| shooter.estimate(receiver.polygon(), &narrowed))
+                .collect()
         });
     }
 
     fn lamp(&self, _: &Mesh, polygon: &Polygon, row: &mut [f32]) {
         self.fill(row, |receiver, range| {
-            self.lamp_factors(polygon, receiver, range, 0)
+            self.lamp_factors(polygon, receiver, range, None)
         });
     }
 }
@@ -148,30 +222,54 @@ impl Parallel<'_> {
         }
     }
 
-    /// Form factors of the elements of one patch; none where the shooter is out of sight.
-    fn factors(&self, shooter: &Shooter, receiver: &Polygon, range: &Range<usize>) -> Vec<f32> {
-        let view = shooter.seen_by(receiver, self.bvh);
-        self.element_factors(&view, receiver, range)
+    /// Form factors of the elements of one patch; none where the shooter is hidden from all of it.
+    fn factors(
+        &self,
+        shooter: &Shooter,
+        receiver: &Polygon,
+        range: &Range<usize>,
+        narrowed: &Narrowed,
+    ) -> Vec<f32> {
+        let view = shooter.seen_by(receiver, narrowed);
+        if view.is_hidden() {
+            return Vec::new();
+        }
+        let receivers = self.receivers[range.clone()].iter();
+        receivers
+            .map(|receiver| view.form_factor(receiver, narrowed))
+            .collect()
     }
 
-    /// The same; where much stands between, the lamp is quartered, so that less is in the way of each
-    /// part.
+    /// The same. Where much stands between, rays look for a way to the lamp; if one gets through, the lamp is
+    /// quartered, so that less is in the way of each part. `whole` is what stands before the lamp that this
+    /// one is a quarter of, and how often that has been quartered.
     fn lamp_factors(
         &self,
         lamp: &Polygon,
         receiver: &Polygon,
         range: &Range<usize>,
-        depth: u32,
+        whole: Option<(&Narrowed, u32)>,
     ) -> Vec<f32> {
         let shooter = Shooter::new(*lamp);
-        let view = shooter.seen_by(receiver, self.bvh);
-        let is_simple = view.blockers().is_some_and(|count| count <= MANY_BLOCKERS);
-        if is_simple || depth == MOST_QUARTERINGS {
-            return self.element_factors(&view, receiver, range);
+        if shooter.is_out_of_sight(receiver) {
+            return Vec::new();
+        }
+        let shaft = shaft(lamp, receiver);
+        let (narrowed, depth) = match whole {
+            None => (self.bvh.narrowed(&shaft), 0),
+            Some((whole, depth)) => (whole.narrowed(&shaft), depth + 1),
+        };
+        let is_many = narrowed.blockers() > MANY_BLOCKERS;
+        if is_many && !self.finds_a_way(receiver, lamp, range, depth) {
+            return Vec::new();
+        }
+        if !is_many || depth == MOST_QUARTERINGS {
+            return self.factors(&shooter, receiver, range, &narrowed);
         }
         let mut sum = vec![0.0; range.len()];
         for quarter in quarters(lamp) {
-            let factors = self.lamp_factors(&quarter, receiver, range, depth + 1);
+            let whole = Some((&narrowed, depth));
+            let factors = self.lamp_factors(&quarter, receiver, range, whole);
             for (sum, factor) in sum.iter_mut().zip(factors) {
                 *sum += factor;
             }
@@ -179,19 +277,36 @@ impl Parallel<'_> {
         sum
     }
 
-    fn element_factors(&self, view: &View, receiver: &Polygon, range: &Range<usize>) -> Vec<f32> {
-        if view.is_hidden() {
-            return Vec::new();
-        }
-        let receivers = self.receivers[range.clone()].iter();
-        if view.blockers().is_some() {
-            return receivers.map(|r| view.form_factor(r, self.bvh)).collect();
-        }
-        let margin = ROUNDINGS * largest_coordinate(&[*view.shooter().polygon(), *receiver]);
-        let shaft = Shaft::with_margin(receiver, view.shooter().polygon(), margin);
-        let narrowed = self.bvh.narrowed(&shaft);
-        receivers.map(|r| view.form_factor(r, &narrowed)).collect()
+    /// True when a ray from the front of a receiver gets to the front of a lamp, or of a part of it.
+    fn finds_a_way(
+        &self,
+        receiver: &Polygon,
+        lamp: &Polygon,
+        range: &Range<usize>,
+        depth: u32,
+    ) -> bool {
+        let rays = RAYS_TO_LAMP.max(RAYS_PER_ELEMENT * range.len() as u32);
+        let rays = if depth == 0 { rays } else { rays / 4 };
+        let shifts = [0, 1, 2, 3].map(|axis| noise::bits(range.start as u64 * 4 + axis));
+        let mut caster = self.bvh.caster();
+        (0..rays).any(|ray| {
+            let at = |axis: usize| {
+                noise::fraction(shifts[axis].wrapping_add(noise::STEPS[axis].wrapping_mul(ray)))
+            };
+            let (from, _) = from_unit_square(receiver, Vec2::new(at(0), at(1)));
+            let (to, _) = from_unit_square(lamp, Vec2::new(at(2), at(3)));
+            let is_in_front = |polygon: &Polygon, point| polygon.height(point).0 > 0.0;
+            is_in_front(receiver, to)
+                && is_in_front(lamp, from)
+                && caster.sees(lifted(receiver, from), lifted(lamp, to))
+        })
     }
+}
+
+/// What can be between a shooter and the elements of a receiving patch.
+fn shaft(shooter: &Polygon, receiver: &Polygon) -> Shaft {
+    let margin = ROUNDINGS * largest_coordinate(&[*shooter, *receiver]);
+    Shaft::with_margin(receiver, shooter, margin)
 }
 
 /// Four parts of a polygon.
@@ -219,4 +334,90 @@ pub fn quarters(polygon: &Polygon) -> [Polygon; 4] {
 fn largest_coordinate(polygons: &[Polygon]) -> f32 {
     let vertices = polygons.iter().flat_map(Polygon::vertices);
     vertices.map(|v| v.abs().max_element()).fold(0.0, f32::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bake::Meshed;
+    use crate::reference::path_trace::PathTracer;
+    use crate::scene::{Light, OwnedScene};
+    use crate::study::truth::element_receivers;
+    use glam::Vec3;
+    use relume::color::Rgb;
+    use relume::scene::{Emission, Surface};
+    use std::ops::ControlFlow;
+
+    /// A floor under a lamp, with a blind of 60 slats between; the slats leave `gap` of every tenth open.
+    fn blind(gap: f32) -> OwnedScene {
+        let level = |x: [f32; 2], y: [f32; 2], z: f32| {
+            let corners = [(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1])];
+            corners.map(|(x, y)| Vec3::new(x, y, z))
+        };
+        let mut lamp = level([-1.0, 1.0], [-1.0, 1.0], 2.0);
+        lamp.reverse();
+        let emission = Emission {
+            light: 0,
+            share: Rgb::WHITE,
+        };
+        let lamp = Surface::new(0, &lamp, Rgb::BLACK).unwrap();
+        let floor = Surface::new(1, &level([-1.0, 1.0], [-1.0, 1.0], 0.0), Rgb::splat(0.5));
+        let slats = (-30_i16..30).map(|slat| {
+            let x = f32::from(slat) / 10.0;
+            let outline = level([x, x + 0.1 * (1.0 - gap)], [-3.0, 3.0], 1.0);
+            Surface::new(2, &outline, Rgb::BLACK).unwrap()
+        });
+        let surfaces = [lamp.emitting(0, emission).unwrap(), floor.unwrap()];
+        let surfaces: Vec<Surface> = surfaces.into_iter().chain(slats).collect();
+        OwnedScene {
+            textures: vec![None; surfaces.len()],
+            surfaces,
+            luminaires: Vec::new(),
+            lights: vec![Light {
+                name: "lamp".to_owned(),
+                emission: Rgb::WHITE,
+                importance: 1.0,
+            }],
+        }
+    }
+
+    /// What a floor of elements of half a metre gets of that lamp, and what paths say, with standard errors.
+    fn through(gap: f32) -> Vec<(f64, f64, f64)> {
+        let scene = blind(gap);
+        let mut go_on = |_| ControlFlow::Continue(());
+        let meshed = Meshed::new(&scene, Some(1.0), Some(0.5), &mut go_on).unwrap();
+        let mesh = meshed.mesh().view();
+        let mut row = vec![0.0; mesh.elements.len()];
+        let lamp = meshed.view().unwrap().surfaces()[0];
+        Parallel::new(&mesh, meshed.bvh()).lamp(&mesh, lamp.polygon(), &mut row);
+        let receivers: Vec<_> = element_receivers(&mesh)
+            .into_iter()
+            .map(|(receiver, _)| receiver)
+            .collect();
+        let traced = PathTracer::new(&scene)
+            .unwrap()
+            .estimate(&receivers, 4000, 1);
+        let values = row.iter().zip(&traced);
+        values
+            .map(|(factor, traced)| {
+                let traced = traced[0];
+                (f64::from(*factor), traced.direct[1], traced.direct_error[1])
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_lamp_behind_many_slats_gives_what_paths_find() {
+        for gap in [0.5, 0.02] {
+            for (found, truth, error) in through(gap) {
+                assert!(truth > 3.0 * error, "{gap}: {truth} {error}");
+                // The four points of an element see slats that are half as wide as they are apart: 2 %.
+                let off = (found - truth).abs();
+                assert!(
+                    off < 0.02 * truth + 4.0 * error,
+                    "{gap}: {found} {truth} {error}"
+                );
+            }
+        }
+    }
 }

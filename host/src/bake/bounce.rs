@@ -62,14 +62,13 @@ pub(super) fn gather(
         hits.cast(&rays);
         if hits.passes() as u32 == next_look.min(passes) {
             light.bounce(&mesh, &hits, job.settings.residual);
-            if light.estimate(&mesh, &hits) <= job.settings.noise {
+            if light.error() <= job.settings.noise {
                 break;
             }
             next_look *= 2;
         }
     }
     light.bounce(&mesh, &hits, job.settings.residual);
-    light.estimate(&mesh, &hits);
     let rows = lamps.rows + hits.passes() as u32;
     Ok((light.solved(rows, mesh, job.settings), hits))
 }
@@ -94,7 +93,6 @@ pub(super) fn along(
         return Err(BakeError::Interrupted);
     }
     light.bounce(&mesh, hits, job.settings.residual);
-    light.estimate(&mesh, hits);
     Ok(light.solved(lamps.rows + passes, mesh, job.settings))
 }
 
@@ -170,7 +168,7 @@ impl Light {
         }
     }
 
-    /// Solves for the bounces along the rays there are.
+    /// Solves for the bounces along the rays there are, and estimates what error they leave.
     fn bounce(&mut self, mesh: &OwnedMesh, hits: &Hits, residual: f32) {
         if self.passes > 0 && self.passes == hits.passes() {
             return;
@@ -183,6 +181,7 @@ impl Light {
                 (block.indirect, block.left) = (bounced.indirect, bounced.left);
             }
             block.measure(mesh);
+            block.estimate(mesh, hits);
         }
     }
 
@@ -192,16 +191,8 @@ impl Light {
         residuals.take(self.lights).fold(0.0, f32::max)
     }
 
-    /// Estimates the relative L1 error of every light: what the scatter of the rays leaves, and
-    /// what has not been distributed. The largest.
-    fn estimate(&mut self, mesh: &OwnedMesh, hits: &Hits) -> f32 {
-        for block in &mut self.blocks {
-            let noise = hits.noise(&mesh.view(), &block.irradiance());
-            let errors = block.errors.iter_mut().zip(noise).zip(block.residuals);
-            for ((error, noise), residual) in errors {
-                *error = noise + residual;
-            }
-        }
+    /// The largest estimated error of all lights.
+    fn error(&self) -> f32 {
         let errors = self.blocks.iter().flat_map(|block| block.errors);
         errors.take(self.lights).fold(0.0, f32::max)
     }
@@ -254,6 +245,15 @@ impl Block {
         for ((residual, unshot), emitted) in self.residuals.iter_mut().zip(unshot).zip(self.emitted)
         {
             *residual = if emitted > 0.0 { unshot / emitted } else { 0.0 };
+        }
+    }
+
+    /// Relative L1 errors: what the scatter of the rays leaves, and what has not been distributed.
+    fn estimate(&mut self, mesh: &OwnedMesh, hits: &Hits) {
+        let noise = hits.noise(&mesh.view(), &self.irradiance());
+        let errors = self.errors.iter_mut().zip(noise).zip(self.residuals);
+        for ((error, noise), residual) in errors {
+            *error = noise + residual;
         }
     }
 }

@@ -90,6 +90,21 @@ pub(super) struct Met {
     pub front: bool,
 }
 
+impl Met {
+    /// Nothing nearer than a distance.
+    pub const fn nothing(distance: f32) -> Self {
+        Self {
+            distance,
+            surface: u32::MAX,
+            front: false,
+        }
+    }
+
+    pub const fn is_surface(&self) -> bool {
+        self.surface != u32::MAX
+    }
+}
+
 /// Four linear functions.
 #[derive(Default)]
 struct Linears {

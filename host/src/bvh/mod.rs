@@ -206,6 +206,26 @@ pub struct Narrowed<'a> {
     blockers: Vec<Obstacle<'a>>,
 }
 
+impl<'a> Narrowed<'a> {
+    /// How many there are.
+    #[must_use]
+    pub const fn blockers(&self) -> usize {
+        self.blockers.len()
+    }
+
+    /// Those of them that can stand between parts of the two regions.
+    #[must_use]
+    pub fn narrowed(&self, shaft: &Shaft) -> Self {
+        let blockers = self.blockers.iter().copied();
+        Self {
+            bvh: self.bvh,
+            blockers: blockers
+                .filter(|obstacle| shaft.admits(obstacle.polygon))
+                .collect(),
+        }
+    }
+}
+
 impl Visibility for Narrowed<'_> {
     fn sees(&self, from: Vec3, to: Vec3) -> bool {
         self.bvh.sees(from, to)

@@ -1,4 +1,4 @@
-//! The nearest surface along a ray.
+//! The nearest surface along a ray, and whether there is one at all.
 //!
 //! [`Polygon::crossing`] weighs the roundings of both ends to answer as a device does; here a surface
 //! costs a few products, and four are asked at once. Surfaces become *facets*, which have grown by
@@ -34,6 +34,8 @@ pub struct Caster<'a> {
     facets: &'a Facets,
     /// What is left to look at, and how far away it is.
     waiting: Vec<(f32, Child)>,
+    /// The block that last stood between two points: it often stands between the next two as well.
+    blocker: u32,
 }
 
 impl<'a> Caster<'a> {
@@ -41,6 +43,7 @@ impl<'a> Caster<'a> {
         Self {
             facets,
             waiting: Vec::new(),
+            blocker: 0,
         }
     }
 
@@ -48,6 +51,22 @@ impl<'a> Caster<'a> {
     #[must_use]
     pub fn nearest(&mut self, from: Vec3, direction: Vec3) -> Option<Hit> {
         self.facets.nearest(from, direction, &mut self.waiting)
+    }
+
+    /// True when nothing lies between two points that are [`lifted`] off their surfaces. All others have
+    /// grown here, so less is seen past an edge than [`Polygon::crossing`] lets through.
+    ///
+    /// [`lifted`]: super::lifted
+    /// [`Polygon::crossing`]: relume::geometry::Polygon::crossing
+    #[must_use]
+    pub fn sees(&mut self, from: Vec3, to: Vec3) -> bool {
+        let ray = Ray::new(from, to - from);
+        if self.facets.is_blocked_by(self.blocker, &ray) {
+            return false;
+        }
+        let blocker = self.facets.blocker(&ray, to - from, &mut self.waiting);
+        self.blocker = blocker.unwrap_or(self.blocker);
+        blocker.is_none()
     }
 }
 
@@ -118,11 +137,7 @@ impl Facets {
     /// What a ray meets first.
     fn nearest(&self, from: Vec3, direction: Vec3, waiting: &mut Vec<(f32, Child)>) -> Option<Hit> {
         let ray = Ray::new(from, direction);
-        let mut met = Met {
-            distance: f32::INFINITY,
-            surface: u32::MAX,
-            front: false,
-        };
+        let mut met = Met::nothing(f32::INFINITY);
         if self.nodes.is_empty() {
             for block in &self.blocks {
                 block.meet(&ray, &mut met);
@@ -130,7 +145,7 @@ impl Facets {
         } else {
             self.descend(&ray, direction, &mut met, waiting);
         }
-        met.distance.is_finite().then_some(Hit {
+        met.is_surface().then_some(Hit {
             surface: met.surface,
             distance: met.distance,
             front: met.front,
@@ -148,18 +163,36 @@ impl Facets {
             match child {
                 Child::Block(block) => self.blocks[block as usize].meet(ray, met),
                 Child::Node(node) => {
-                    let node = &self.nodes[node as usize];
-                    let (near, mut hits) = node.meet(&slabs, met.distance);
-                    let first = waiting.len();
-                    while hits != 0 {
-                        let lane = hits.trailing_zeros() as usize;
-                        hits &= hits - 1;
-                        waiting.push((near[lane], node.children[lane]));
-                        sort_last(&mut waiting[first..]);
-                    }
+                    self.nodes[node as usize].open(&slabs, met.distance, waiting);
                 }
             }
         }
+    }
+
+    /// A block that a ray meets within its length.
+    fn blocker(&self, ray: &Ray, direction: Vec3, waiting: &mut Vec<(f32, Child)>) -> Option<u32> {
+        if self.nodes.is_empty() {
+            return (0..self.blocks.len() as u32).find(|block| self.is_blocked_by(*block, ray));
+        }
+        let slabs = Slabs::new(ray, direction);
+        waiting.clear();
+        waiting.push((0.0, Child::Node(0)));
+        while let Some((_, child)) = waiting.pop() {
+            match child {
+                Child::Block(block) if self.is_blocked_by(block, ray) => return Some(block),
+                Child::Block(_) => {}
+                Child::Node(node) => self.nodes[node as usize].open(&slabs, 1.0, waiting),
+            }
+        }
+        None
+    }
+
+    fn is_blocked_by(&self, block: u32, ray: &Ray) -> bool {
+        let mut met = Met::nothing(1.0);
+        if let Some(block) = self.blocks.get(block as usize) {
+            block.meet(ray, &mut met);
+        }
+        met.is_surface()
     }
 }
 
@@ -224,6 +257,19 @@ impl Node {
         Self {
             bounds,
             children: [Child::Node(0); LANES],
+        }
+    }
+
+    /// Adds what is met before `farthest` to what waits, the nearest last.
+    #[inline]
+    fn open(&self, slabs: &Slabs, farthest: f32, waiting: &mut Vec<(f32, Child)>) {
+        let (near, mut hits) = self.meet(slabs, farthest);
+        let first = waiting.len();
+        while hits != 0 {
+            let lane = hits.trailing_zeros() as usize;
+            hits &= hits - 1;
+            waiting.push((near[lane], self.children[lane]));
+            sort_last(&mut waiting[first..]);
         }
     }
 
@@ -308,6 +354,9 @@ mod tests {
             for (from, direction) in rays {
                 let (from, direction) = (place(from), direction.normalize());
                 let hit = caster.nearest(from, direction);
+                // To as far as the scene is wide: what is nearest stands between, or nothing does.
+                let is_free = hit.is_none_or(|hit| hit.distance >= size);
+                prop_assert_eq!(caster.sees(from, from + direction * size), is_free, "{:?}", hit);
                 for (surface, number) in surfaces.iter().zip(0..) {
                     let polygon = surface.polygon();
                     let tolerance = 4.0 * f64::from(polygon.height(Vec3::splat(farthest)).1);

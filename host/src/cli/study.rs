@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod paper;
+mod quantization;
 mod stability;
 mod table;
 
@@ -31,6 +32,8 @@ enum Name {
     Stability,
     /// The tables of the papers beside ours
     Paper,
+    /// Formats of contributions: error against number of lights and against bits
+    Quantization,
 }
 
 pub fn run(arguments: &Arguments) -> Result<Outcome> {
@@ -40,6 +43,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome> {
         Name::Accuracy => accuracy::run(folder)?,
         Name::Stability => stability::run(folder)?,
         Name::Paper => paper::run(folder)?,
+        Name::Quantization => quantization::run(folder)?,
     };
     Ok(Outcome::done(report))
 }

@@ -8,7 +8,7 @@
 //! with `E` the irradiance, `D` its direct part, which lamps and luminaires give exactly, and `h(r)`
 //! the element in which ray `r` ends. Every element shoots, so there is no substructuring error, and
 //! work grows with the elements alone. The places on the receiver and the directions are a rank-one
-//! sequence in four dimensions (Roberts 2018, R4), shifted for every receiver by its number.
+//! sequence in four dimensions ([`noise::STEPS`]), shifted for every receiver by its number.
 
 mod file;
 
@@ -29,9 +29,6 @@ pub use file::{MAGIC, RowsError, read, write};
 
 /// A ray that ends in no element.
 const NOTHING: u32 = u32::MAX;
-
-/// `1/g, 1/g^2, 1/g^3, 1/g^4` with `g^5 = g + 1`, in parts of 2^32.
-const STEPS: [u32; 4] = [3_679_390_609, 3_152_041_523, 2_700_274_806, 2_313_257_605];
 
 /// Rays of every element that are cast together.
 pub const RAYS_PER_PASS: u32 = 16;
@@ -66,7 +63,7 @@ struct Step {
 
 impl Step {
     fn new(index: u32) -> Self {
-        let [s, t, share, turn] = STEPS.map(|step| index.wrapping_mul(step));
+        let [s, t, share, turn] = noise::STEPS.map(|step| index.wrapping_mul(step));
         Self {
             place: [s, t],
             share,

@@ -20,10 +20,9 @@ use relume::geometry::{Polygon, from_unit_square, gauss_points};
 use relume::luminaire;
 use relume::mesh::{Face, Mesh, Side, Spacing, is_face, subdivide};
 use relume::scene::{Scene, Source};
-use relume::visibility::Visibility;
 
 use super::{BuildError, OwnedMesh};
-use crate::bvh::{Bvh, Hit, lifted};
+use crate::bvh::{Bvh, Caster, Hit, lifted};
 use crate::noise;
 
 /// Walks that start at each part.
@@ -186,12 +185,13 @@ impl<'a> Surroundings<'a> {
     /// walks that escape ask them themselves.
     fn cast_light(&self) -> Vec<Place> {
         let mut lit = Vec::new();
+        let mut caster = self.bvh.caster();
         for (number, lamp) in some_of(&self.lamps, LIGHTS_THAT_CAST, 0) {
             for cast in 0..CASTS {
                 let seed = (number * CASTS + cast) * 4;
                 let at = Vec2::new(noise::unit(seed), noise::unit(seed + 1));
                 let start = Place::new(lamp, from_unit_square(lamp, at).0);
-                lit.extend(self.next(start, seed + 2));
+                lit.extend(self.next(&mut caster, start, seed + 2));
             }
         }
         for (number, luminaire) in some_of(self.scene.luminaires(), LIGHTS_THAT_CAST, 0) {
@@ -212,18 +212,18 @@ impl<'a> Surroundings<'a> {
                 let angle = TAU * noise::unit(seed - 1);
                 let across = (1.0 - along * along).max(0.0).sqrt();
                 let ray = axis * along + (u * angle.cos() + v * angle.sin()) * across;
-                lit.extend(self.end_of(position, ray));
+                lit.extend(self.end_of(&mut caster, position, ray));
             }
         }
         lit
     }
 
-    /// True when light comes to a part, directly or along its walks.
+    /// True when light comes to a part, along its walks or directly; the walks find out sooner.
     fn reaches(&self, mesh: &Mesh, part: u32) -> bool {
         let Some(polygon) = mesh.patch_polygon(part) else {
             return false;
         };
-        self.lights_directly(&polygon, part) || self.walks_lead_to_light(&polygon, part)
+        self.walks_lead_to_light(&polygon, part) || self.lights_directly(&polygon, part)
     }
 
     fn lights_directly(&self, polygon: &Polygon, part: u32) -> bool {
@@ -236,15 +236,16 @@ impl<'a> Surroundings<'a> {
 
     fn walks_lead_to_light(&self, polygon: &Polygon, part: u32) -> bool {
         let points = gauss_points(polygon);
+        let mut caster = self.bvh.caster();
         let leads_to_light = |walk: &u64| {
             let seed = (u64::from(part) * WALKS + walk) * LONGEST_WALK;
             let mut place = Place::new(polygon, points[*walk as usize % points.len()].position);
             for step in 0..LONGEST_WALK {
                 let seed = (seed + step) * (2 + 4 * GLANCES);
-                if self.is_lit(place, seed + 2) {
+                if self.is_lit(&mut caster, place, seed + 2) {
                     return true;
                 }
-                match self.next(place, seed) {
+                match self.next(&mut caster, place, seed) {
                     None => return false,
                     Some(next) => place = next,
                 }
@@ -256,21 +257,21 @@ impl<'a> Surroundings<'a> {
     }
 
     /// Where a cosine-weighted ray ends; `None` when it escapes or is absorbed.
-    fn next(&self, place: Place, seed: u64) -> Option<Place> {
+    fn next(&self, caster: &mut Caster, place: Place, seed: u64) -> Option<Place> {
         let (u, v) = place.normal.any_orthonormal_pair();
         let (share, angle) = (noise::unit(seed), TAU * noise::unit(seed + 1));
         let across = u * angle.cos() + v * angle.sin();
         let ray = across * share.sqrt() + place.normal * (1.0 - share).sqrt();
-        self.end_of(place.start, ray)
+        self.end_of(caster, place.start, ray)
     }
 
     /// Where a ray meets a side that reflects; `None` when it escapes or is absorbed.
-    fn end_of(&self, from: Vec3, ray: Vec3) -> Option<Place> {
+    fn end_of(&self, caster: &mut Caster, from: Vec3, ray: Vec3) -> Option<Place> {
         let Hit {
             surface,
             distance,
             front,
-        } = self.bvh.caster().nearest(from, ray)?;
+        } = caster.nearest(from, ray)?;
         let surface = &self.scene.surfaces()[surface as usize];
         let side = if front { Side::Front } else { Side::Back };
         let reflects = is_face(surface, side) && !surface.reflectance().is_black();
@@ -282,7 +283,7 @@ impl<'a> Surroundings<'a> {
     }
 
     /// True when a point gets light: from a luminaire, a lamp or a lit point.
-    fn is_lit(&self, place: Place, seed: u64) -> bool {
+    fn is_lit(&self, caster: &mut Caster, place: Place, seed: u64) -> bool {
         let Place {
             position, normal, ..
         } = place;
@@ -295,19 +296,17 @@ impl<'a> Surroundings<'a> {
                 Place::new(lamp, from_unit_square(lamp, at).0)
             });
             let lit = pick(&self.lit, seed + 3).copied();
-            lamp.is_some_and(|lamp| self.exchange(place, lamp))
-                || lit.is_some_and(|lit| self.exchange(place, lit))
+            lamp.is_some_and(|lamp| exchange(caster, place, lamp))
+                || lit.is_some_and(|lit| exchange(caster, place, lit))
         })
     }
+}
 
-    /// True when two places face and see each other.
-    fn exchange(&self, a: Place, b: Place) -> bool {
-        let ray = b.position - a.position;
-        let least = GRAZING * ray.length();
-        ray.dot(a.normal) > least
-            && ray.dot(b.normal) < -least
-            && self.bvh.sees(a.position, b.position)
-    }
+/// True when two places face and see each other.
+fn exchange(caster: &mut Caster, a: Place, b: Place) -> bool {
+    let ray = b.position - a.position;
+    let least = GRAZING * ray.length();
+    ray.dot(a.normal) > least && ray.dot(b.normal) < -least && caster.sees(a.start, b.start)
 }
 
 /// At most `most` of `items`, with their numbers, evenly spread; all of them if they are no more.

@@ -6,6 +6,7 @@
 pub mod accuracy;
 pub mod hemicube;
 pub mod paper;
+pub mod quantization;
 pub mod ray_rows;
 pub mod shooting;
 pub mod stability;

@@ -53,7 +53,9 @@ pub(super) fn lambert(normal: Vec3, outline: &[Vectors]) -> Numbers {
         let cosine = a.dot(*b) * scale;
         let mut ratio = cosine.map(|x| math::angle_over_sine(x.abs()));
         if Numbers::ZERO.above(cosine) != 0 {
-            let straight = sine.dot(sine).map(|square| PI * math::reciprocal_sqrt(square));
+            let straight = sine
+                .dot(sine)
+                .map(|square| PI * math::reciprocal_sqrt(square));
             ratio = ratio.if_negative(cosine, straight - ratio);
         }
         sum = sum + sine.dot(normal) * ratio;

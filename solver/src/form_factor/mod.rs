@@ -13,6 +13,7 @@
 //! `cos a cos b / r^2` at 4 of 16 stratified points of the patch. Factors are finite and in [0, 1];
 //! a coplanar or back-facing pair gives 0.
 
+mod estimate;
 mod lambert;
 mod lanes;
 mod view;
@@ -23,10 +24,14 @@ use heapless::Vec;
 
 use crate::geometry::{Polygon, SamplePoint, from_unit_square};
 use crate::mesh::{Element, Mesh};
-use crate::visibility::Visibility;
+use crate::visibility::{Shaft, Visibility};
 
+pub use estimate::estimate;
 pub use lambert::point_to_polygon;
 pub use view::{Receiver, View};
+
+/// Most surfaces that may stand between one receiver and one shooter to be met one by one.
+const BLOCKERS: usize = 48;
 
 /// A patch that shoots, with the points at which its visibility is sampled.
 #[derive(Clone, Debug)]
@@ -73,11 +78,7 @@ impl Shooter {
 
     /// What stands between the shooter and a receiver, once for all parts of the receiver.
     #[must_use]
-    pub fn seen_by<'s>(
-        &'s self,
-        receiver: &Polygon,
-        visibility: &'s impl Visibility,
-    ) -> View<'s> {
+    pub fn seen_by<'s>(&'s self, receiver: &Polygon, visibility: &'s impl Visibility) -> View<'s> {
         View::new(self, receiver, visibility)
     }
 
@@ -116,6 +117,21 @@ impl Shooter {
     }
 }
 
+/// All that a shaft admits; `None` when it is more than [`BLOCKERS`].
+fn blockers(
+    shaft: impl FnOnce() -> Shaft,
+    visibility: &impl Visibility,
+) -> Option<Vec<&Polygon, BLOCKERS>> {
+    let mut blockers = Vec::new();
+    let mut fits = true;
+    if visibility.may_block() {
+        visibility.between(&shaft(), &mut |blocker| {
+            fits &= blockers.push(blocker.polygon).is_ok();
+        });
+    }
+    fits.then_some(blockers)
+}
+
 /// True when all of `other` lies behind the plane of `polygon`, or in it.
 fn faces_away(polygon: &Polygon, other: &Polygon) -> bool {
     other.vertices().iter().all(|v| {
@@ -135,39 +151,34 @@ pub fn fill(
     visibility: &impl Visibility,
     row: &mut [f32],
 ) {
-    let elements = mesh.elements.get(first as usize..).unwrap_or_default();
-    row.fill(f32::NAN);
-    for (element, start) in elements.iter().zip(0..row.len()) {
-        if row.get(start).is_some_and(|factor| factor.is_nan()) {
-            let rest = elements.iter().zip(row.iter_mut()).skip(start);
-            fill_patch(mesh, shooter, element.patch, visibility, rest);
-        }
-    }
-    for factor in row.iter_mut().skip(elements.len()) {
-        *factor = 0.0;
-    }
+    let mut near: Option<(u32, View)> = None;
+    fill_with(mesh, first, row, |element, receiver| {
+        // Neighbours are of the same patch, for which what stands between is looked up once.
+        let known = near.take().filter(|(patch, _)| *patch == element.patch);
+        let look_up = || {
+            let patch = mesh.patch_polygon(element.patch)?;
+            Some((element.patch, shooter.seen_by(&patch, visibility)))
+        };
+        near = known.or_else(look_up);
+        near.as_ref().map_or(0.0, |(_, view)| {
+            view.form_factor(&Receiver::new(receiver), visibility)
+        })
+    });
 }
 
-/// Fills in the elements of one patch, which stand near each other.
-fn fill_patch<'e>(
+/// Fills `row[j]` with what `factor` says of element `first + j`; 0 beyond the mesh.
+fn fill_with(
     mesh: &Mesh,
-    shooter: &Shooter,
-    patch: u32,
-    visibility: &impl Visibility,
-    elements: impl Iterator<Item = (&'e Element, &'e mut f32)>,
+    first: u32,
+    row: &mut [f32],
+    mut factor: impl FnMut(&Element, Polygon) -> f32,
 ) {
-    let view = mesh.patch_polygon(patch).map(|polygon| shooter.seen_by(&polygon, visibility));
-    let view = view.filter(|view| !view.is_hidden());
-    let end = mesh.patches.get(patch as usize).map_or(0.0, |patch| patch.from.y.max(patch.to.y));
-    // Parameters grow along `t`: the patch's elements have been met when another one's are beyond its end.
-    let is_near = |element: &Element| element.patch == patch || element.from.y.min(element.to.y) < end;
-    let elements = elements.take_while(|(element, _)| is_near(element));
-    for (element, factor) in elements.filter(|(element, _)| element.patch == patch) {
-        let receiver = mesh.element_polygon(element).map(Receiver::new);
-        *factor = match (&view, receiver) {
-            (Some(view), Some(receiver)) => view.form_factor(&receiver, visibility),
-            _ => 0.0,
-        };
+    let elements = mesh.elements.get(first as usize..).unwrap_or_default();
+    row.fill(0.0);
+    for (value, element) in row.iter_mut().zip(elements) {
+        if let Some(receiver) = mesh.element_polygon(element) {
+            *value = factor(element, receiver);
+        }
     }
 }
 

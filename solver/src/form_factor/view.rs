@@ -9,12 +9,9 @@ use heapless::Vec;
 use super::lambert::{Outline, lambert};
 use super::lanes::{Numbers, Vectors};
 use super::visible::{Blocker, Hides, Points, hides, visible_factors};
-use super::Shooter;
+use super::{BLOCKERS, Shooter};
 use crate::geometry::{Plane, Polygon, SamplePoint, clip, gauss_points};
 use crate::visibility::{Body, Obstacle, Shaft, Visibility};
-
-/// Most surfaces that may stand between a receiver and a shooter to be cut out exactly.
-const BLOCKERS: usize = 48;
 
 /// An element with the points that stand for it.
 #[derive(Clone, Debug)]
@@ -34,7 +31,8 @@ impl Receiver {
         let points = gauss_points(&polygon);
         let point = |index| points.get(index).copied();
         let of = [point(0), point(1), point(2), point(3)];
-        let position = |point: Option<SamplePoint>| point.map_or_else(|| polygon.center(), |p| p.position);
+        let position =
+            |point: Option<SamplePoint>| point.map_or_else(|| polygon.center(), |p| p.position);
         let points = Vectors::new(of.map(position));
         Self {
             polygon,
@@ -42,6 +40,12 @@ impl Receiver {
             magnitude: points.magnitude(),
             weights: of.map(|point| point.map_or(0.0, |p| p.weight)),
         }
+    }
+
+    /// Its outline.
+    #[must_use]
+    pub const fn polygon(&self) -> &Polygon {
+        &self.polygon
     }
 }
 
@@ -69,7 +73,13 @@ impl<'s> View<'s> {
             return Self::nothing(shooter, receiver.plane());
         }
         let shaft = || Shaft::new(receiver, &shooter.polygon);
-        Self::of_plane(shooter, receiver.plane(), receiver.vertices(), visibility, shaft)
+        Self::of_plane(
+            shooter,
+            receiver.plane(),
+            receiver.vertices(),
+            visibility,
+            shaft,
+        )
     }
 
     pub(super) fn of_point(
@@ -189,7 +199,11 @@ impl<'s> View<'s> {
         }
         let points = self.points(receiver.points, receiver.magnitude);
         let factors = self.exact(&points).unwrap_or_else(|| {
-            let samples = receiver.points.lanes().into_iter().zip(&self.shooter.samples);
+            let samples = receiver
+                .points
+                .lanes()
+                .into_iter()
+                .zip(&self.shooter.samples);
             let mut factors = [0.0; 4];
             for (factor, (point, samples)) in factors.iter_mut().zip(samples) {
                 *factor = self.sampled(point, samples, visibility);

@@ -168,7 +168,9 @@ impl Cones {
                 let to = Vectors::all(edge.to) - points.world;
                 let one = Numbers::all(1.0);
                 let side = one.within(right & !left) - one.within(left & !right);
-                self.planes.push((from.cross(to) * side, left ^ right)).ok()?;
+                self.planes
+                    .push((from.cross(to) * side, left ^ right))
+                    .ok()?;
             }
         }
         Some(ALL)
@@ -248,7 +250,8 @@ fn cut(piece: &[Vectors], plane: &Vectors, lanes: Mask, part: &mut Outline) -> O
     };
     for (b, at_b) in corners {
         if at_a.1 != at_b.1 {
-            part.push(*a + (*b - *a) * (at_a.0 / (at_a.0 - at_b.0))).ok()?;
+            part.push(*a + (*b - *a) * (at_a.0 / (at_a.0 - at_b.0)))
+                .ok()?;
         }
         if at_b.1 {
             part.push(*b).ok()?;
@@ -337,7 +340,10 @@ pub(super) fn visible_factors(
     }
     let open = lambert(normal, &piece);
     let hidden = hidden(&cones, normal, &piece, lit, &cuts, DEPTH)?;
-    let seen = (open - hidden).zip(open, |sum, open| if sum > SLIVER * open { sum } else { 0.0 });
+    let seen = (open - hidden).zip(
+        open,
+        |sum, open| if sum > SLIVER * open { sum } else { 0.0 },
+    );
     Some(seen.within(lit))
 }
 

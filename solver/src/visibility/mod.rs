@@ -15,8 +15,8 @@ use heapless::Vec;
 use crate::geometry::{Plane, Polygon};
 use crate::scene::Surface;
 
-pub use body::{Body, bodies};
 pub(crate) use body::FACES;
+pub use body::{Body, bodies};
 
 /// A surface that may hide something.
 #[derive(Clone, Copy, Debug)]

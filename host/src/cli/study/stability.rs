@@ -1,4 +1,4 @@
-//! `relume study stability`: writes `stability.csv`.
+//! `relume study stability`: writes `stability.csv` and `stability.svg`.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use anyhow::Result;
 use serde_json::{Value, json};
 
 use super::table::Table;
-use crate::cli::tell;
+use crate::cli::{tell, write_file};
 use crate::study::stability::{self, Case};
 
 pub fn run(folder: &Path) -> Result<Value> {
@@ -40,6 +40,8 @@ pub fn run(folder: &Path) -> Result<Value> {
         rows: cases.iter().map(row).collect(),
     };
     table.write(folder)?;
+    let chart = stability::chart(&cases).svg()?;
+    write_file(&folder.join("stability.svg"), chart.as_bytes())?;
     let cases: Vec<Value> = cases.iter().map(Case::json).collect();
     Ok(json!({ "cases": cases }))
 }

@@ -4,7 +4,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::{Accuracy, Family, Measured, Reference, Storage};
-use crate::chart::{Chart, ChartError, Series, Style};
+use crate::chart::{Chart, ChartError, Series, Style, Vertical};
 use crate::study::truth::LightError;
 
 /// What a bake costs.
@@ -264,32 +264,23 @@ impl Accuracy {
     fn way_chart(&self, scene: &str, cost: Cost, judge: Judge) -> Chart {
         let compared = self.compared(scene, cost, judge);
         let place = |(_, cost, error): &(&Measured, f64, LightError)| (*cost, 100.0 * error.error);
-        let of_family = |family: Family| Series {
-            name: family.name().to_owned(),
-            style: Style::Curve,
-            points: compared
-                .iter()
-                .filter(|(row, ..)| row.family == family)
-                .map(place)
-                .collect(),
+        let of_family = |family: Family| {
+            let rows = compared.iter().filter(|(row, ..)| row.family == family);
+            Series::new(family.name(), Style::Curve, rows.map(place))
         };
         let everything: Vec<(f64, f64)> = compared.iter().map(place).collect();
         let default = compared.iter().filter(|(row, ..)| row.is_default);
         let mut series: Vec<Series> = Family::ALL.map(of_family).into();
-        series.push(Series {
-            name: "Pareto front".to_owned(),
-            style: Style::Front,
-            points: front(&everything),
-        });
-        series.push(Series {
-            name: "the default".to_owned(),
-            style: Style::Ring,
-            points: default.map(place).collect(),
-        });
+        series.push(Series::new(
+            "Pareto front",
+            Style::Front,
+            front(&everything),
+        ));
+        series.push(Series::new("the default", Style::Ring, default.map(place)));
         Chart {
             title: format!("{scene}: worst light against {}", judge.title()),
             x: cost.axis().to_owned(),
-            y: "relative L2 error (%)".to_owned(),
+            y: Vertical::Values("relative L2 error (%)".to_owned()),
             series,
         }
     }
@@ -300,16 +291,12 @@ impl Accuracy {
             let rows = self.sizes(scene, Storage::F32);
             let rows = rows.into_iter().filter(|row| row.family == family);
             let points = rows.map(|row| (row.seconds, 100.0 * row.pointwise.worst().error));
-            Series {
-                name: family.name().to_owned(),
-                style: Style::Curve,
-                points: points.collect(),
-            }
+            Series::new(family.name(), Style::Curve, points)
         };
         Chart {
             title: format!("{scene}: worst light at points, mesh sizes"),
             x: Cost::Time.axis().to_owned(),
-            y: "relative L2 error (%)".to_owned(),
+            y: Vertical::Values("relative L2 error (%)".to_owned()),
             series: [Family::Split, Family::Gather].map(of_family).into(),
         }
     }
@@ -323,16 +310,13 @@ impl Accuracy {
                 let error = 100.0 * row.pointwise.worst().error;
                 (row.bytes() as f64 / 1024.0, error)
             });
-            Series {
-                name: format!("{}, {} B", storage.name(), storage.bytes()),
-                style: Style::Curve,
-                points: points.collect(),
-            }
+            let name = format!("{}, {} B", storage.name(), storage.bytes());
+            Series::new(name, Style::Curve, points)
         };
         Chart {
             title: format!("{scene}: worst light at points, as stored"),
             x: "contributions, all elements and lights (KiB)".to_owned(),
-            y: "relative L2 error (%)".to_owned(),
+            y: Vertical::Values("relative L2 error (%)".to_owned()),
             series: Storage::ALL.map(stored).into(),
         }
     }

@@ -13,6 +13,7 @@ use relume::mesh::Spacing;
 use super::clock::{median, seconds};
 use super::rooms::Room;
 use crate::builtin::white_furnace;
+use crate::chart::{Chart, Series, Style, Vertical};
 use crate::rows::Parallel;
 use crate::study::system::System;
 
@@ -175,6 +176,26 @@ fn gauss_seidel(matrix: &[f32], n: usize) -> u32 {
         }
     }
     0
+}
+
+/// Time over the number of faces.
+pub fn chart(columns: &[Faces]) -> Chart {
+    let series = |name: &str, milliseconds: fn(&Faces) -> f64| {
+        let point = |column: &Faces| (column.faces as f64, milliseconds(column));
+        Series::new(name, Style::Curve, columns.iter().map(point))
+    };
+    Chart {
+        title: "form factors of a cube's faces, and sweeps".to_owned(),
+        x: "number of faces".to_owned(),
+        y: Vertical::Values("time on one thread (ms)".to_owned()),
+        series: vec![
+            series("basic", |column| column.published[0]),
+            series("stored geometry", |column| column.published[1]),
+            series("half matrix, by reciprocity", |column| column.published[2]),
+            series("our exact rows", |column| column.exact),
+            series("Gauss-Seidel sweeps", |column| column.sweeping),
+        ],
+    }
 }
 
 /// A unit cube with `side * side` faces on each wall.

@@ -8,6 +8,7 @@ use anyhow::Result;
 
 use super::clock::{Shots, published, typical};
 use super::rooms::{Room, SPACING, combined, only, room};
+use crate::chart::{Chart, Series, Style, Vertical};
 use crate::study::ray_rows::RayRows;
 use crate::study::system::LANES;
 
@@ -92,6 +93,33 @@ pub fn measure(lights: u32, repeats: usize) -> Result<Sampling> {
         lane: tagged_rest / count * 1e9,
         alike: pairs.filter(|(a, b)| a == b).count() as f64 / f64::from(SHOTS),
     })
+}
+
+/// Time over the number of lights; the tagged solve says how many times faster it is than separate ones.
+pub fn chart(columns: &[Sampling]) -> Chart {
+    let series = |name: &str, seconds: fn(&Sampling) -> Option<f64>| {
+        let points = columns.iter().filter_map(|column| {
+            let seconds = seconds(column)?;
+            Some((f64::from(column.lights), seconds))
+        });
+        Series::new(name, Style::Curve, points)
+    };
+    let speedups = columns
+        .iter()
+        .map(|column| format!("{:.1} x", column.speedup()));
+    Chart {
+        title: format!("{SHOTS} shots: combined, separate and tagged solves"),
+        x: "number of lights".to_owned(),
+        y: Vertical::Values("time on one thread (s)".to_owned()),
+        series: vec![
+            series("separate", |column| Some(column.separate)),
+            series("combined", |column| Some(column.combined)),
+            series("tagged, so many times faster", |column| Some(column.tagged))
+                .with_notes(speedups),
+            series("published: separate", |column| Some(column.published?[1])),
+            series("published: tagged", |column| Some(column.published?[2])),
+        ],
+    }
 }
 
 fn shots<const K: usize>(room: &Room) -> Result<Shots> {

@@ -188,7 +188,8 @@ fn t_junction() -> Result<Case> {
         values.sum::<f64>() / 4.0
     };
     let shooter = Shooter::new(lamp);
-    let averaged = |receiver: &Polygon| f64::from(shooter.form_factor(receiver, &Occluders::new(&[])));
+    let averaged =
+        |receiver: &Polygon| f64::from(shooter.form_factor(receiver, &Occluders::new(&[])));
     let gap = |value: &dyn Fn(&Polygon) -> f64| {
         let parts = (value(&halves[0]) + value(&halves[1])) / 2.0;
         (value(&whole) / parts - 1.0).abs()

@@ -14,6 +14,8 @@ mod solves;
 use anyhow::Result;
 use serde_json::{Value, json};
 
+use crate::chart::{Chart, Series, Style, Vertical};
+
 pub use scenes::with_reflectance;
 
 /// One known failure.
@@ -55,6 +57,26 @@ impl Case {
             "why": self.why,
             "holds": self.holds(),
         })
+    }
+}
+
+/// All cases below each other: what the published method gives, what we give, and the bound between them.
+#[must_use]
+pub fn chart(cases: &[Case]) -> Chart {
+    let series = |name: &str, style, value: fn(&Case) -> f64| {
+        let points = cases.iter().map(value).zip(0..);
+        let points = points.map(|(value, number)| (value, f64::from(number)));
+        Series::new(name, style, points)
+    };
+    Chart {
+        title: "known failures: a published method beside ours".to_owned(),
+        x: "error (relative, or as the table says)".to_owned(),
+        y: Vertical::Names(cases.iter().map(|case| case.name.clone()).collect()),
+        series: vec![
+            series("published method", Style::Dots, |case| case.naive),
+            series("ours", Style::Dots, |case| case.ours),
+            series("bound that ours keeps", Style::Limit, |case| case.bound),
+        ],
     }
 }
 
