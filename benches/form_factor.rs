@@ -55,7 +55,7 @@ fn rows(criterion: &mut Criterion) {
     let owned = scenes::meshed(&room);
     let mesh = owned.view();
     let (brute, bvh) = (
-        Occluders::new(&room.scene.surfaces),
+        Occluders(&room.scene.surfaces),
         Bvh::for_scene(&room.scene.view().expect("a legal scene")),
     );
     let mut row = vec![0.0; mesh.elements.len()];

@@ -49,7 +49,7 @@ fn main() {
 }
 
 fn compare(criterion: &mut Criterion, rays: &str, surfaces: &[Surface], segments: &[Segment]) {
-    let (bvh, brute) = (Bvh::new(surfaces, 100.0), Occluders::new(surfaces));
+    let (bvh, brute) = (Bvh::new(surfaces, 100.0), Occluders(surfaces));
     let open = count_open(&bvh, segments);
     assert_eq!(open, count_open(&brute, segments), "both answer alike");
 

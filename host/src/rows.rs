@@ -14,7 +14,7 @@ use relume::luminaire;
 use relume::mesh::Mesh;
 use relume::refine::Refinement;
 use relume::scene::{Luminaire, Scene};
-use relume::visibility::{Occluders, Shaft, Visibility};
+use relume::visibility::{OccludersAndBodies, Shaft, Visibility};
 
 use crate::bvh::{Bvh, Narrowed, lifted};
 use crate::noise;
@@ -103,7 +103,7 @@ fn dark_shares(mesh: &Mesh, scene: &Scene, filler: &impl RowFiller) -> Vec<f32> 
 #[derive(Clone, Copy, Debug)]
 pub struct Serial<'a>(
     /// The surfaces that block.
-    pub Occluders<'a>,
+    pub OccludersAndBodies<'a>,
 );
 
 impl RowFiller for Serial<'_> {

@@ -44,7 +44,7 @@
 //! let mut refinement = Refinement::new(mesh, scene.lights(), 1e-3, memory.storage())?;
 //! let mut row = [0.0; 16];
 //! while let Some(patch) = refinement.next_shooter() {
-//!     relume::form_factor::row(&mesh, patch, &Occluders::new(&surfaces), &mut row);
+//!     relume::form_factor::row(&mesh, patch, &Occluders(&surfaces), &mut row);
 //!     refinement.shoot(patch, &row)?;
 //! }
 //! let middle = refinement.irradiance(5, 0);

@@ -271,7 +271,7 @@ mod tests {
     }
 
     fn at_origin(source: &Source, blockers: &[Surface]) -> f32 {
-        irradiance(source, &receiver(), 100.0, &Occluders::new(blockers))
+        irradiance(source, &receiver(), 100.0, &Occluders(blockers))
     }
 
     #[test]
@@ -344,7 +344,7 @@ mod tests {
             let expected = (1.0 + f32::cos(tilt.to_radians())) / 2.0;
             for (corners, square) in [3, 4].into_iter().zip(&mut squares) {
                 let plane = Polygon::new(&outline[..corners]).unwrap();
-                let found = irradiance(&Source::Sky, &plane, 1e4, &Occluders::new(&[ground]));
+                let found = irradiance(&Source::Sky, &plane, 1e4, &Occluders(&[ground]));
                 let error = (found - expected).abs();
                 // Along the axes, horizontal and vertical planes are exact by symmetry.
                 let is_exact = tilt % 90.0 == 0.0 && azimuth % 90.0 == 0.0;
@@ -379,7 +379,7 @@ mod tests {
                 let blade = Surface::new(0, &blade, Rgb::BLACK).unwrap();
                 let outline = square(1e-5, 0.0);
                 let receiver = Polygon::new(&outline).unwrap();
-                let found = irradiance(&sun, &receiver, 100.0, &Occluders::new(&[blade]));
+                let found = irradiance(&sun, &receiver, 100.0, &Occluders(&[blade]));
                 let expected = (c.acos() - c * (1.0 - c * c).sqrt()) / core::f32::consts::PI;
                 // 16 directions, at most two of them on the wrong side.
                 let error = (found - expected).abs();

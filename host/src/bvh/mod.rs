@@ -301,7 +301,7 @@ mod tests {
             let triangles: Vec<_> = triangles.iter().map(|t| t.map(|v| v * size)).collect();
             let surfaces = surfaces(&triangles);
             let bvh = Bvh::new(&surfaces, 2.0 * size);
-            let brute = Occluders::new(&surfaces);
+            let brute = Occluders(&surfaces);
             for (from, to) in ends {
                 let (from, to) = (from * size, to * size);
                 prop_assert_eq!(bvh.sees(from, to), brute.sees(from, to), "{} {}", from, to);
@@ -319,7 +319,7 @@ mod tests {
                 Surface::new(0, &[o, o + u, o + u + v, o + v], Rgb::BLACK).unwrap()
             }).collect();
             let bvh = Bvh::new(&surfaces, 2.0);
-            let brute = Occluders::new(&surfaces);
+            let brute = Occluders(&surfaces);
             for &(x, y, z, w, axis) in &steps {
                 let from = Vec3::new(at(x), at(y), at(z)) * 0.75;
                 let mut to = from;
@@ -336,7 +336,7 @@ mod tests {
         ) {
             let surfaces = surfaces(&triangles);
             let bvh = Bvh::new(&surfaces, 2.0 * far);
-            let brute = Occluders::new(&surfaces);
+            let brute = Occluders(&surfaces);
             for (corner, direction) in ends {
                 // Just past an outline, where the tolerance of a far end decides.
                 let corner = triangles[corner / 3 % triangles.len()][corner % 3];

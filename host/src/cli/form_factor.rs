@@ -192,7 +192,7 @@ fn solver_factor(
         .collect::<Result<_, _>>()
         .map_err(|error| refused(&error))?;
     Ok(Estimate {
-        value: f64::from(shooter.form_factor(&receiver, &Occluders::new(&surfaces))),
+        value: f64::from(shooter.form_factor(&receiver, &Occluders(&surfaces))),
         error: f64::NAN,
     })
 }

@@ -156,7 +156,7 @@ proptest! {
         let shooter = Shooter::new(shooter);
         let open = shooter.form_factor(&receiver, &Open);
         let surface = Surface::new(0, blocker.vertices(), Rgb::BLACK).unwrap();
-        let blocked = shooter.form_factor(&receiver, &Occluders::new(&[surface]));
+        let blocked = shooter.form_factor(&receiver, &Occluders(&[surface]));
         // Cut pieces round by themselves.
             prop_assert!(blocked <= open * 1.000_01 + 1e-6, "{blocked} {open}");
     }

@@ -128,7 +128,7 @@ impl<const K: usize> Lent<K> {
 fn run<const K: usize>(refinement: &mut Refinement<K>, mesh: &Mesh, surfaces: &[Surface]) {
     let mut row = vec![0.0; mesh.elements.len()];
     while let Some(patch) = refinement.next_shooter() {
-        form_factor::row(mesh, patch, &Occluders::new(surfaces), &mut row);
+        form_factor::row(mesh, patch, &Occluders(surfaces), &mut row);
         refinement.shoot(patch, &row).unwrap();
     }
     refinement.finish();
@@ -248,7 +248,7 @@ fn finishing_twice_or_in_between_changes_nothing_but_rounding() {
     let mut refinement = Refinement::new(mesh, 6, 1e-5, memory.storage()).unwrap();
     let mut row = [0.0; ELEMENTS];
     while let Some(patch) = refinement.next_shooter() {
-        form_factor::row(&mesh, patch, &Occluders::new(&surfaces), &mut row);
+        form_factor::row(&mesh, patch, &Occluders(&surfaces), &mut row);
         refinement.shoot(patch, &row).unwrap();
         refinement.finish();
     }
@@ -309,7 +309,7 @@ fn an_early_stop_plus_ambient_beats_an_early_stop() {
     let mut row = [0.0; ELEMENTS];
     for _ in 0..12 {
         let patch = refinement.next_shooter().unwrap();
-        form_factor::row(&mesh, patch, &Occluders::new(&surfaces), &mut row);
+        form_factor::row(&mesh, patch, &Occluders(&surfaces), &mut row);
         refinement.shoot(patch, &row).unwrap();
     }
     refinement.finish();

@@ -43,45 +43,46 @@ pub trait Visibility {
 
 /// Every surface of a scene, asked one after the other: work grows with their number.
 #[derive(Clone, Copy, Debug)]
-pub struct Occluders<'a> {
-    surfaces: &'a [Surface],
-    bodies: &'a [Body],
-}
-
-impl<'a> Occluders<'a> {
-    /// Surfaces that block, each by itself.
-    #[must_use]
-    pub const fn new(surfaces: &'a [Surface]) -> Self {
-        Self::with_bodies(surfaces, &[])
-    }
-
-    /// Surfaces that block, and the [`bodies`] among them: what is hidden is the same but for
-    /// rounding, and found with less work.
-    #[must_use]
-    pub const fn with_bodies(surfaces: &'a [Surface], bodies: &'a [Body]) -> Self {
-        Self { surfaces, bodies }
-    }
-
-    fn body(&self, surface: u32) -> Option<&'a Body> {
-        self.bodies
-            .iter()
-            .find(|body| body.surfaces().contains(&surface))
-    }
-}
+pub struct Occluders<'a>(pub &'a [Surface]);
 
 impl Visibility for Occluders<'_> {
     fn sees(&self, from: Vec3, to: Vec3) -> bool {
         !self
-            .surfaces
+            .0
             .iter()
             .any(|surface| surface.polygon().crossing(from, to).is_some())
+    }
+
+    fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(Obstacle<'v>)) {
+        let polygons = self.0.iter().map(Surface::polygon);
+        for polygon in polygons.filter(|polygon| shaft.admits(polygon)) {
+            let body = None;
+            visit(Obstacle { polygon, body });
+        }
+    }
+}
+
+/// The same, where the closed convex [`bodies`] among the surfaces are known: what is hidden is the same but
+/// for rounding, and found with less work.
+#[derive(Clone, Copy, Debug)]
+pub struct OccludersAndBodies<'a> {
+    /// The surfaces.
+    pub surfaces: &'a [Surface],
+    /// The bodies among them.
+    pub bodies: &'a [Body],
+}
+
+impl Visibility for OccludersAndBodies<'_> {
+    fn sees(&self, from: Vec3, to: Vec3) -> bool {
+        Occluders(self.surfaces).sees(from, to)
     }
 
     fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(Obstacle<'v>)) {
         for (surface, number) in self.surfaces.iter().zip(0..) {
             let polygon = surface.polygon();
             if shaft.admits(polygon) {
-                let body = self.body(number);
+                let mut bodies = self.bodies.iter();
+                let body = bodies.find(|body| body.surfaces().contains(&number));
                 visit(Obstacle { polygon, body });
             }
         }
@@ -289,7 +290,7 @@ mod tests {
             Vec3::new(-1.0, 1.0, 0.0),
         ];
         let surfaces = [Surface::new(0, &plate, Rgb::BLACK).unwrap()];
-        let occluders = Occluders::new(&surfaces);
+        let occluders = Occluders(&surfaces);
         let (above, below) = (Vec3::Z, -Vec3::Z);
         assert!(!occluders.sees(above, below));
         assert!(!occluders.sees(below, above));

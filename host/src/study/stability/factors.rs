@@ -149,7 +149,7 @@ fn lamp_on_a_wall() -> Result<Case> {
         lamp.flipped()
     };
     let truth = perpendicular_rectangles(1.0, 1.0, 1.0);
-    let ours = Shooter::new(lamp).form_factor(&wall, &Occluders::new(&[]));
+    let ours = Shooter::new(lamp).form_factor(&wall, &Occluders(&[]));
     let error = |found: f32| (f64::from(found) / truth - 1.0).abs();
     Ok(Case {
         name: "a light that touches a wall".into(),
@@ -188,8 +188,7 @@ fn t_junction() -> Result<Case> {
         values.sum::<f64>() / 4.0
     };
     let shooter = Shooter::new(lamp);
-    let averaged =
-        |receiver: &Polygon| f64::from(shooter.form_factor(receiver, &Occluders::new(&[])));
+    let averaged = |receiver: &Polygon| f64::from(shooter.form_factor(receiver, &Occluders(&[])));
     let gap = |value: &dyn Fn(&Polygon) -> f64| {
         let parts = (value(&halves[0]) + value(&halves[1])) / 2.0;
         (value(&whole) / parts - 1.0).abs()

@@ -56,7 +56,7 @@ impl<V: Visibility> RowFiller for Kernel<'_, V> {
 }
 
 /// Nothing blocks, as before there was a way to tell (Goral et al. 1984).
-pub const UNOCCLUDED: Occluders = Occluders::new(&[]);
+pub const UNOCCLUDED: Occluders = Occluders(&[]);
 
 /// How far rays start from surfaces, whatever the scene's unit is (`RAY_EPSILON` of pbrt, first edition).
 pub const RAY_EPSILON: f32 = 1e-3;
