@@ -13,7 +13,6 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput};
 use glam::{DVec3, Vec3};
 use relume::form_factor::{self, point_to_polygon};
-use relume::geometry::Polygon;
 use relume::mesh::Mesh;
 use relume::visibility::{Obstacle, Occluders, Shaft, Visibility};
 use relume_host::builtin::PaperLamps;
