@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use glam::Vec2;
 use rayon::prelude::*;
-use relume::form_factor::{self, Receiver, Shooter};
+use relume::form_factor::{self, Receiver, Shooter, View};
 use relume::geometry::{Polygon, from_unit_square};
 use relume::luminaire;
 use relume::mesh::Mesh;
@@ -178,11 +178,12 @@ impl RowFiller for Parallel<'_> {
     fn shooter(&self, _: &Mesh, polygon: &Polygon, row: &mut [f32]) {
         let shooter = Shooter::new(*polygon);
         self.fill(row, |receiver, range| {
-            if shooter.is_out_of_sight(receiver) {
-                return Vec::new();
+            let view = shooter.seen_by(receiver, self.bvh);
+            if view.is_exact() {
+                return self.seen(&view, range, self.bvh);
             }
             let narrowed = self.bvh.narrowed(&shaft(polygon, receiver));
-            self.factors(&shooter, receiver, range, &narrowed)
+            self.seen(&view, range, &narrowed)
         });
     }
 
@@ -223,20 +224,13 @@ impl Parallel<'_> {
     }
 
     /// Form factors of the elements of one patch; none where the shooter is hidden from all of it.
-    fn factors(
-        &self,
-        shooter: &Shooter,
-        receiver: &Polygon,
-        range: &Range<usize>,
-        narrowed: &Narrowed,
-    ) -> Vec<f32> {
-        let view = shooter.seen_by(receiver, narrowed);
+    fn seen(&self, view: &View, range: &Range<usize>, visibility: &impl Visibility) -> Vec<f32> {
         if view.is_hidden() {
             return Vec::new();
         }
         let receivers = self.receivers[range.clone()].iter();
         receivers
-            .map(|receiver| view.form_factor(receiver, narrowed))
+            .map(|receiver| view.form_factor(receiver, visibility))
             .collect()
     }
 
@@ -264,7 +258,8 @@ impl Parallel<'_> {
             return Vec::new();
         }
         if !is_many || depth == MOST_QUARTERINGS {
-            return self.factors(&shooter, receiver, range, &narrowed);
+            let view = shooter.seen_by(receiver, &narrowed);
+            return self.seen(&view, range, &narrowed);
         }
         let mut sum = vec![0.0; range.len()];
         for quarter in quarters(lamp) {

@@ -170,11 +170,10 @@ impl<'s> View<'s> {
         self.shooter
     }
 
-    /// How many surfaces and bodies may hide a part of the shooter; `None` for more than can be cut out for all
-    /// of the receiver at once.
+    /// False where more stands before the receiver than can be cut out for all of it at once.
     #[must_use]
-    pub fn blockers(&self) -> Option<usize> {
-        self.is_exact.then_some(self.blockers.len())
+    pub const fn is_exact(&self) -> bool {
+        self.is_exact
     }
 
     /// True where nothing of the shooter can be seen from anywhere on the receiver.
