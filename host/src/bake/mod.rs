@@ -500,6 +500,39 @@ mod tests {
     }
 
     #[test]
+    fn an_element_is_exposed_but_for_what_is_under_a_box() {
+        let whole = bake(&room(Vec3::ZERO), &COARSE, &mut |_| {
+            ControlFlow::Continue(())
+        });
+        let solution = whole.unwrap();
+        let mesh = solution.mesh.view();
+        // Lowest and highest corner of the box's foot.
+        let (low, high) = (Vec3::new(0.0, -2.0, -0.25), Vec3::new(1.0, -2.0, 0.75));
+        let mut partly = 0;
+        for (id, element) in mesh.elements.iter().enumerate() {
+            let polygon = mesh.element_polygon(element).unwrap();
+            let is_floor = polygon.vertices().iter().all(|v| v.y == -2.0);
+            let [least, most] = [Vec3::min, Vec3::max]
+                .map(|extreme| polygon.vertices().iter().copied().reduce(extreme).unwrap());
+            let under = (most.min(high) - least.max(low)).max(Vec3::ZERO);
+            let covered = if is_floor {
+                under.x * under.z / polygon.area()
+            } else {
+                0.0
+            };
+            let expected = (1.0 - covered).max(0.25);
+            partly += usize::from(covered > 0.0 && covered < 1.0);
+            // Four standard errors of 1024 random rays; these are evener.
+            let found = solution.exposed(id);
+            assert!(
+                (found - expected).abs() < 0.06,
+                "{id}: {found} instead of {expected}"
+            );
+        }
+        assert_eq!(partly, 4);
+    }
+
+    #[test]
     fn who_breaks_off_gets_nothing_before_the_first_row_and_what_is_known_after_it() {
         let scene = room(Vec3::ZERO);
         let is_row = |progress: &Progress| matches!(progress, Progress::Shooting { .. });
