@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use relume::color::Rgb;
 use relume::form_factor::Shooter;
 use relume::geometry::Polygon;
@@ -179,47 +179,22 @@ fn solver_factor(
     blockers: &[ConvexPolygon],
 ) -> Result<Estimate> {
     let origin = from.vertices()[0];
-    let local = |polygon: &ConvexPolygon| -> Vec<Vec<Vec3>> {
+    let local = |polygon: &ConvexPolygon| -> Vec<glam::Vec3> {
         let vertices = polygon.vertices().iter();
-        let vertices: Vec<Vec3> = vertices.map(|v| (*v - origin).as_vec3()).collect();
-        fan(&vertices)
+        vertices.map(|v| (*v - origin).as_vec3()).collect()
     };
     let refused = |error: &dyn std::fmt::Display| anyhow!("{error} (in f32); use --method exact");
-    let polygons = |polygon| -> Result<Vec<Polygon>> {
-        let parts = local(polygon).into_iter();
-        parts
-            .map(|part| Polygon::new(&part).map_err(|error| refused(&error)))
-            .collect()
-    };
-    let (receivers, shooters) = (polygons(from)?, polygons(to)?);
-    let surfaces = blockers.iter().flat_map(local).zip(0..);
-    let surfaces = surfaces.map(|(part, index)| Surface::new(index, &part, Rgb::BLACK));
+    let polygon = |p| Polygon::new(&local(p)).map_err(|error| refused(&error));
+    let (receiver, shooter) = (polygon(from)?, Shooter::new(polygon(to)?));
+    let surfaces = blockers.iter().zip(0..);
+    let surfaces = surfaces.map(|(b, index)| Surface::new(index, &local(b), Rgb::BLACK));
     let surfaces: Vec<Surface> = surfaces
         .collect::<Result<_, _>>()
         .map_err(|error| refused(&error))?;
-
-    let area: f32 = receivers.iter().map(Polygon::area).sum();
-    let mut value = 0.0;
-    for shooter in shooters.into_iter().map(Shooter::new) {
-        for receiver in &receivers {
-            let factor = shooter.form_factor(receiver, &Occluders(&surfaces));
-            value += f64::from(factor * (receiver.area() / area));
-        }
-    }
     Ok(Estimate {
-        value,
+        value: f64::from(shooter.form_factor(&receiver, &Occluders(&surfaces))),
         error: f64::NAN,
     })
-}
-
-/// A convex polygon in quads about its first vertex, and a triangle where one is left.
-fn fan(vertices: &[Vec3]) -> Vec<Vec<Vec3>> {
-    let (apex, rim) = vertices.split_at(1);
-    let starts = (0..rim.len().saturating_sub(1)).step_by(2);
-    let part = |start: usize| rim[start..].iter().take(3);
-    starts
-        .map(|start| apex.iter().chain(part(start)).copied().collect())
-        .collect()
 }
 
 fn print_table(cases: &[Case], answers: &[Answer]) {
