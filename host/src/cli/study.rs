@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod paper;
+mod scale;
 mod stability;
 mod table;
 
@@ -31,6 +32,8 @@ enum Name {
     Stability,
     /// The tables of the papers beside ours
     Paper,
+    /// Time and memory over the number of elements, in a scene of 14 000 polygons (reads RELUME_DATA)
+    Scale,
 }
 
 pub fn run(arguments: &Arguments) -> Result<Outcome> {
@@ -40,6 +43,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome> {
         Name::Accuracy => accuracy::run(folder)?,
         Name::Stability => stability::run(folder)?,
         Name::Paper => paper::run(folder)?,
+        Name::Scale => scale::run(folder)?,
     };
     Ok(Outcome::done(report))
+}
+
+/// The folder with the scenes that are not part of the program.
+fn data() -> PathBuf {
+    std::env::var_os("RELUME_DATA").map_or_else(|| "../shared/data".into(), PathBuf::from)
 }
