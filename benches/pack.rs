@@ -2,7 +2,7 @@
 //!
 //! The paper's room with 8 lights, 960 x 8 contributions of three channels: `encode` and `decode`
 //! work on single values, spread over the range of the code; `measured` adds scales and bytes and the
-//! error over 73 states of the lights, `parse` checks the bytes again (checksum and every value),
+//! error over 1335 states of the lights, `parse` checks the bytes again (checksum and every value),
 //! `unpack` makes a solution of them.
 
 mod scenes;
@@ -11,7 +11,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput};
 use relume::atlas::Atlas;
-use relume::code::{Code, DecodeTable, LARGEST, encode};
+use relume::code::{Code, Curve, Scale};
 use relume_host::builtin::PaperLamps;
 use relume_host::pack::{Format, pack, unpack};
 use relume_host::solution::Solution;
@@ -28,30 +28,41 @@ fn main() {
 /// Values of a room of 8 lights.
 const VALUES: u16 = 960 * 8 * 3;
 
+/// One channel of every curve, over values from a ten-thousandth of the largest to the largest.
 fn codes(criterion: &mut Criterion) {
-    let value = |number: u16| LARGEST * f32::from(number) / f32::from(VALUES);
+    let value = |number: u16| (f32::from(number) / f32::from(VALUES) * 9.2 - 9.2).exp();
     let values: Vec<f32> = (0..VALUES).map(value).collect();
-    let codes: Vec<u8> = values.iter().map(|value| encode(*value)).collect();
-    let table = DecodeTable::new();
-
-    let mut group = criterion.benchmark_group("pack/code");
+    let scale = Scale::fitting(1.0).expect("a legal scale");
+    let white = Scale::at_least(0.1).expect("a legal scale");
+    let curves = [
+        ("exp8s", Curve::Exponential { scale }, 255),
+        (
+            "display8",
+            Curve::display_between(white, 1e-4, 1.0, 255).expect("it fits"),
+            255,
+        ),
+        ("tiles", Curve::display(white, 1.85).expect("it fits"), 1000),
+        (
+            "tiles-log",
+            Curve::logarithmic(1e-4).expect("it fits"),
+            1000,
+        ),
+    ];
+    let mut group = criterion.benchmark_group("pack/curve");
     group.throughput(Throughput::Elements(values.len() as u64));
-    group.bench_function("encode", |bencher| {
-        bencher.iter(|| {
-            values
-                .iter()
-                .map(|value| encode(*value))
-                .fold(0, u8::wrapping_add)
+    for (name, curve, last) in curves {
+        group.bench_function(format!("encode {name}"), |bencher| {
+            bencher.iter(|| {
+                let codes = values.iter().map(|value| curve.encode(*value, last));
+                codes.fold(0, u16::wrapping_add)
+            });
         });
-    });
-    group.bench_function("decode", |bencher| {
-        bencher.iter(|| {
-            black_box(&codes)
-                .iter()
-                .map(|code| table.decode(*code))
-                .sum::<f32>()
+        let codes: Vec<u16> = values.iter().map(|v| curve.encode(*v, last)).collect();
+        group.bench_function(format!("decode {name}"), |bencher| {
+            let codes = black_box(&codes).iter();
+            bencher.iter(|| codes.clone().map(|code| curve.decode(*code)).sum::<f32>());
         });
-    });
+    }
     group.finish();
 }
 

@@ -2,7 +2,7 @@
 //!
 //! One bake of each room, then every code of it; a table on stderr in display codes: the
 //! largest error of relit irradiance over elements, channels and all test states (all on, each light
-//! alone, 64 dimmings), the state in which it occurs, the median over lights of the error
+//! alone, dimmings and colours), the state in which it occurs, the median over lights of the error
 //! with that light alone, and the error of what is shown. Built-in rooms have 1, 3 and 8 lamps; rooms of
 //! 64 and 256 come from the reference data, where it is. Times are those of packing alone and of
 //! measuring the error.
@@ -52,20 +52,20 @@ fn bake(scene: &OwnedScene) -> Solution {
 
 fn print_table(solutions: &[Solution]) {
     eprintln!("error in display codes");
-    eprintln!("lights  code    codes (bytes)  largest  alone  shown  worst state");
+    eprintln!("lights  code       codes (bytes)  largest  alone  shown  worst state");
     for solution in solutions {
         for code in Code::ALL {
             let bytes = packed(solution, code);
             let atlas = Atlas::parse(&bytes).expect("bytes just written");
             let error = packing_error(solution, &atlas).expect("its own solution");
             eprintln!(
-                "{:>6}  {:<6}  {:>13}  {:>7.2}  {:>5.2}  {:>5.2}  {}",
+                "{:>6}  {:<9}  {:>13}  {:>7.2}  {:>5.2}  {:>5.2}  {}",
                 solution.lights.len(),
                 code.name(),
-                atlas.all_codes().len(),
-                error.codes,
+                atlas.code_bytes(),
+                error.all.packed,
                 median_alone(&error),
-                error.codes_shown,
+                error.all.shown,
                 error.worst_state,
             );
         }

@@ -1,5 +1,6 @@
 //! Relighting: element x light per second in `f32`, in integers, and for a change of one light.
 //!
+//! Integers multiply on the way, or only add from a table of all products that is filled anew for every frame.
 //! Beside them the time to copy the same code bytes, in the same unit: what memory alone would take.
 //! A change of one light counts the elements of that light only; what matters is its time, which
 //! takes the place of a whole relight. Two sizes: the paper's room with 8 lights (23 kB of codes), and
@@ -10,24 +11,27 @@ mod scenes;
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput};
-use relume::atlas::{Atlas, Channels, Contents, LightEntry, Quantity, size, write};
-use relume::code::{Code, DecodeTable, Scale};
+use relume::atlas::{Atlas, Contents, LightEntry, Quantity, size, write};
+use relume::code::{Code, Scale};
 use relume::color::Rgb;
-use relume::relight::{FixedMix, change_fixed, float_weights, relight, relight_fixed};
+use relume::relight::{
+    DecodeTable, FixedMix, FixedTable, FixedWeight, change_fixed, relight, relight_fixed,
+    table_length,
+};
 
 fn main() {
     let mut criterion = scenes::criterion();
-    for channels in [Channels::Rgb, Channels::Luminance] {
-        measure(&mut criterion, 960, 8, channels);
+    for code in [Code::Exp8s, Code::Lum8] {
+        measure(&mut criterion, 960, 8, code);
     }
-    measure(&mut criterion, 8000, 64, Channels::Rgb);
+    measure(&mut criterion, 8000, 64, Code::Exp8s);
     criterion.final_summary();
 }
 
-fn measure(criterion: &mut Criterion, elements: u32, lights: u32, channels: Channels) {
-    let bytes = atlas_bytes(elements, lights, channels);
+fn measure(criterion: &mut Criterion, elements: u32, lights: u32, code: Code) {
+    let bytes = atlas_bytes(elements, lights, code);
     let atlas = Atlas::parse(&bytes).expect("bytes just written");
-    let name = format!("relight/{elements} x {lights} {channels:?}");
+    let name = format!("relight/{elements} x {lights} {code}");
     let mix: Vec<Rgb> = (0..lights)
         .map(|light| Rgb::splat(0.1 + 0.01 * light as f32))
         .collect();
@@ -44,12 +48,12 @@ fn contributions(atlas: &Atlas) -> Throughput {
 }
 
 fn copy(criterion: &mut Criterion, name: &str, atlas: &Atlas) {
-    let mut copied = vec![0; atlas.all_codes().len()];
+    let mut copied = vec![0; atlas.codes().len()];
     let mut group = criterion.benchmark_group(name);
     group.throughput(contributions(atlas));
     group.bench_function("copy of the codes", |bencher| {
         bencher.iter(|| {
-            copied.copy_from_slice(black_box(atlas.all_codes()));
+            copied.copy_from_slice(black_box(atlas.codes()));
             black_box(&copied);
         });
     });
@@ -57,15 +61,14 @@ fn copy(criterion: &mut Criterion, name: &str, atlas: &Atlas) {
 }
 
 fn float(criterion: &mut Criterion, name: &str, atlas: &Atlas, mix: &[Rgb]) {
-    let table = DecodeTable::new();
-    let mut weights = vec![Rgb::BLACK; mix.len()];
+    let mut values = vec![0.0; table_length(atlas)];
+    let table = DecodeTable::new(atlas, &mut values).expect("room for all");
     let mut irradiance = vec![Rgb::BLACK; atlas.element_count() as usize];
     let mut group = criterion.benchmark_group(name);
     group.throughput(contributions(atlas));
     group.bench_function("f32", |bencher| {
         bencher.iter(|| {
-            float_weights(atlas, black_box(mix), &mut weights).expect("a legal mix");
-            relight(atlas, &table, &weights, &mut irradiance).expect("slices that fit");
+            relight(atlas, &table, black_box(mix), &mut irradiance).expect("slices that fit");
             black_box(&irradiance);
         });
     });
@@ -73,7 +76,7 @@ fn float(criterion: &mut Criterion, name: &str, atlas: &Atlas, mix: &[Rgb]) {
 }
 
 fn fixed(criterion: &mut Criterion, name: &str, atlas: &Atlas, mix: &[Rgb]) {
-    let mut weights = vec![[0; 3]; mix.len()];
+    let mut weights = vec![FixedWeight::EMPTY; mix.len()];
     let mut sums = vec![[0; 3]; atlas.element_count() as usize];
     let mut group = criterion.benchmark_group(name);
     group.throughput(contributions(atlas));
@@ -85,13 +88,23 @@ fn fixed(criterion: &mut Criterion, name: &str, atlas: &Atlas, mix: &[Rgb]) {
             black_box(&sums);
         });
     });
+    let mut values = vec![0; table_length(atlas)];
+    group.bench_function("integers, table", |bencher| {
+        bencher.iter(|| {
+            let mix = black_box(mix);
+            let fixed = FixedMix::new(atlas, mix, mix, &mut weights).expect("a legal mix");
+            let table = FixedTable::new(atlas, &fixed, &mut values).expect("room for all");
+            relight_fixed(atlas, &table, &mut sums).expect("slices that fit");
+            black_box(&sums);
+        });
+    });
     group.finish();
 }
 
 fn change(criterion: &mut Criterion, name: &str, atlas: &Atlas, mix: &[Rgb]) {
     let brightest = vec![Rgb::WHITE; mix.len()];
     let light = mix.len() as u32 / 2;
-    let mut weights = vec![[0; 3]; mix.len()];
+    let mut weights = vec![FixedWeight::EMPTY; mix.len()];
     let mut sums = vec![[0; 3]; atlas.element_count() as usize];
     let mut fixed = FixedMix::new(atlas, &brightest, mix, &mut weights).expect("a legal mix");
     relight_fixed(atlas, &fixed, &mut sums).expect("slices that fit");
@@ -109,19 +122,15 @@ fn change(criterion: &mut Criterion, name: &str, atlas: &Atlas, mix: &[Rgb]) {
 }
 
 /// An atlas without mesh whose codes take all values.
-fn atlas_bytes(elements: u32, lights: u32, channels: Channels) -> Vec<u8> {
-    let entry = LightEntry {
-        name: "",
-        emission: Rgb::WHITE,
-        scale: Scale::ONE,
-    };
+fn atlas_bytes(elements: u32, lights: u32, code: Code) -> Vec<u8> {
+    let entry = LightEntry::exponential("", Rgb::WHITE, code, Scale::ONE);
     let contents = Contents {
-        code: Code::Exp8s,
-        channels,
         quantity: Quantity::Irradiance,
         lights: &vec![entry; lights as usize],
         elements,
+        image_width: 0,
         errors: None,
+        tiles: &[],
         mesh: None,
     };
     let contribution = |element: u32, light: u32| {

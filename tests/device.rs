@@ -11,14 +11,14 @@ use embedded_graphics::image::GetPixel;
 use embedded_graphics::pixelcolor::raw::{LittleEndian, RawU16};
 use embedded_graphics::pixelcolor::{Rgb565, RgbColor};
 use embedded_graphics::prelude::Point;
-use relume::atlas::{self, Atlas, Channels, Contents, LightEntry, Quantity};
+use relume::atlas::{self, Atlas, Contents, LightEntry, Quantity};
 use relume::code::{Code, Scale};
 use relume::color::Rgb;
 use relume::draw::{Sample, Shown, paint};
 use relume::form_factor;
 use relume::mesh::{MeshStorage, subdivide};
 use relume::refine::{Choice, FixedStorage, Refinement};
-use relume::relight::{FixedMix, change_fixed, relight_fixed};
+use relume::relight::{FixedMix, FixedWeight, change_fixed, relight_fixed};
 use relume::scene::Scene;
 use relume::tone::{Exposure, radiance};
 use relume::visibility::Occluders;
@@ -76,20 +76,19 @@ fn bake_and_pack(flash: &mut [u8]) -> usize {
     let lights: Vec<LightEntry> = names
         .iter()
         .zip(0..)
-        .map(|(name, light)| LightEntry {
-            name,
-            emission: Rgb::splat(20.0),
-            scale: Scale::fitting(largest(light)).expect("finite"),
+        .map(|(name, light)| {
+            let scale = Scale::fitting(largest(light)).expect("finite");
+            LightEntry::exponential(name, Rgb::splat(20.0), Code::Exp8s, scale)
         })
         .collect();
     let outlines: Vec<_> = surfaces.iter().map(|s| *s.polygon()).collect();
     let contents = Contents {
-        code: Code::Exp8s,
-        channels: Channels::Rgb,
         quantity: Quantity::Irradiance,
         lights: &lights,
         elements: ELEMENTS as u32,
+        image_width: 0,
         errors: None,
+        tiles: &[],
         mesh: Some((&outlines, mesh)),
     };
     atlas::write(&contents, |e, l| refinement.irradiance(e, l), flash).expect("it fits")
@@ -141,7 +140,7 @@ fn a_device_bakes_packs_relights_and_draws_the_papers_room() {
     let atlas = Atlas::parse(&flash[..length]).expect("it was just written");
 
     let mix = [Rgb::splat(20.0); LIGHTS];
-    let mut weights = [[0; 3]; LIGHTS];
+    let mut weights = [FixedWeight::EMPTY; LIGHTS];
     let mut fixed = FixedMix::new(&atlas, &mix, &mix, &mut weights).expect("it fits");
     let mut sums = [[0; 3]; ELEMENTS];
     relight_fixed(&atlas, &fixed, &mut sums).expect("it fits");

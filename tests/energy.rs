@@ -97,6 +97,32 @@ fn a_closed_room_absorbs_what_its_lamps_emit() {
 }
 
 #[test]
+fn a_closed_room_keeps_its_energy_when_rows_are_estimated() {
+    let room = room();
+    let solve = |shots| {
+        let settings = Settings {
+            shots,
+            ..exact(&room)
+        };
+        baked(&room.scene, &settings)
+    };
+    let whole = solve(None);
+    for shots in [0, 3, 20] {
+        let part = solve(Some(shots));
+        assert_eq!(part.rows, shots);
+        for light in 0..3 {
+            let ((absorbed, emitted), (exact, _)) = (balance(&part, light), balance(&whole, light));
+            // Receiver sums are one, but what a patch sends in all is not scaled: 0.0017 was measured, without any row.
+            let change = (absorbed - exact).abs() / emitted;
+            assert!(
+                change < 0.005,
+                "{shots} rows, light {light}: {absorbed}, not {exact}"
+            );
+        }
+    }
+}
+
+#[test]
 fn form_factors_between_patches_are_reciprocal() {
     let room = room();
     let solution = baked(
@@ -276,8 +302,9 @@ fn luminaires_balance_too() {
 #[test]
 fn threads_and_the_device_give_the_same_bits() {
     let scene = cornell_box().expect("legal");
-    let bytes = |threads: usize, method: Method| {
+    let bytes = |threads: usize, method: Method, shots: Option<u32>| {
         let settings = Settings {
+            shots,
             patch: Some(0.2),
             element: Some(0.05),
             split_direct: true,
@@ -290,14 +317,21 @@ fn threads_and_the_device_give_the_same_bits() {
             .install(|| baked(&scene.scene, &settings));
         relume_host::solution::write(&baked)
     };
-    for method in [Method::Gather, Method::Rows] {
-        let one = bytes(1, method);
+    // Rows to the end, and rows that are missing: then they are estimated.
+    for (method, shots) in [
+        (Method::Gather, None),
+        (Method::Rows, None),
+        (Method::Rows, Some(9)),
+    ] {
+        let one = bytes(1, method, shots);
         for threads in [2, 5] {
             assert!(
-                one == bytes(threads, method),
+                one == bytes(threads, method, shots),
                 "{method:?}, {threads} threads"
             );
         }
+        if method == Method::Rows {
+            assert!(one == bytes(1, Method::Device, shots), "device, {shots:?}");
+        }
     }
-    assert!(bytes(1, Method::Rows) == bytes(1, Method::Device), "device");
 }

@@ -31,11 +31,11 @@ fn with_scene() -> Folder {
     folder
 }
 
-/// The same, baked and packed.
+/// The same, baked and packed in a code whose every value is easy to foretell.
 fn with_room() -> Folder {
     let folder = with_scene();
     folder.done(&format!("bake room.obj {MESH}"));
-    folder.done("pack room.solution");
+    folder.done("pack room.solution --code exp8s");
     folder
 }
 
@@ -318,7 +318,7 @@ fn an_atlas_is_what_was_asked_for() {
         }
         info
     };
-    let own = packed("", "exp8s");
+    let own = packed("--code exp8s", "exp8s");
     assert!(folder.read("a") == folder.read("room.atlas"));
     // One scale for all lights at their nominal strengths, or one for each.
     let ratio = |info: &Value| {
@@ -326,7 +326,7 @@ fn an_atlas_is_what_was_asked_for() {
             let light = &info["per_light"][light];
             let emission = light["emission"].as_array().unwrap().iter();
             let largest = emission.filter_map(Value::as_f64).fold(0.0, f64::max);
-            light["scale"].as_f64().unwrap() * largest
+            light["curves"][0]["scale"].as_f64().unwrap() * largest
         });
         strengths[0] / strengths[1]
     };
@@ -334,7 +334,7 @@ fn an_atlas_is_what_was_asked_for() {
     assert!((ratio(&one) - 1.0).abs() < 1e-3, "{one}");
     assert!((ratio(&own) - 1.0).abs() > 0.1, "{own}");
 
-    let bare = packed("--no-mesh", "exp8s");
+    let bare = packed("--code exp8s --no-mesh", "exp8s");
     assert_eq!(bare["elements"], own["elements"]);
     assert_eq!(bare["faces"], 0);
     assert_eq!(bare["code_bytes"], own["code_bytes"]);
@@ -485,7 +485,7 @@ fn an_atlas_stays_within_the_error_of_its_code() {
         assert_eq!(exact.place, packed.place);
         assert_eq!(exact.light, packed.light);
         let light = LIGHTS.iter().position(|name| *name == exact.light);
-        let scale = &info["per_light"][light.unwrap()]["scale"];
+        let scale = &info["per_light"][light.unwrap()]["curves"][0]["scale"];
         let scale = scale.as_f64().unwrap();
         for (exact, packed) in exact.value.iter().zip(packed.value) {
             // c = round(255 (1 - e^-x)): half a code either way.
@@ -1202,6 +1202,13 @@ fn wrong_usage_is_exit_2() {
         "bake room.obj --method magic",
         "pack",
         "pack room.solution --code zip",
+        "pack room.solution --code ceiling=zip",
+        "pack room.solution --code tiles --code exp8",
+        "pack room.solution --code tiles --max-error 1",
+        "pack room.solution --code tiles --budget 1000",
+        "pack room.solution --max-error 1 --budget 1000",
+        "pack room.solution --max-error 0",
+        "pack room.solution --budget many",
         "relight room.atlas --set ceiling",
         "relight room.atlas --set ceiling=-1",
         "relight room.atlas --set ceiling=#ff",

@@ -54,6 +54,12 @@ fn check_ways(accuracy: &Accuracy) {
             "{plain:?}"
         );
         assert!(plain.rows > 5 * cached.rows, "{plain:?}");
+        // The lamps' rows and estimates of all others leave less than all rows of undivided patches.
+        let closed = of(Family::Closed).nth(1).expect("lamps");
+        assert!(
+            dense_element(closed) < 0.7 * least(Family::Cached),
+            "{closed:?}"
+        );
         // Splitting halves what is left; points at patch centres spoil it again.
         assert!(
             least(Family::Split) < 0.6 * least(Family::Cached),

@@ -10,7 +10,7 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use criterion::Criterion;
-use relume::atlas::{Channels, Quantity};
+use relume::atlas::Quantity;
 use relume::code::Code;
 use relume_host::bake::{Settings, bake};
 use relume_host::builtin::{Builtin, PaperLamps, cornell_box, paper_room};
@@ -71,10 +71,9 @@ pub fn meshed(builtin: &Builtin) -> OwnedMesh {
 }
 
 /// Irradiance in RGB with the mesh, in the given code.
-pub const fn format(code: Code) -> Format {
+pub fn format(code: Code) -> Format {
     Format {
-        code,
-        channels: Channels::Rgb,
+        packing: code.into(),
         quantity: Quantity::Irradiance,
         mesh: true,
     }

@@ -30,8 +30,8 @@ const HEADROOM: u32 = 110;
 /// Width of a letter on an axis, px.
 const LETTER: u32 = 6;
 
-/// Colours that remain distinct for all kinds of sight (M. Okabe and K. Ito 2008).
-const PALETTE: [RGBColor; 8] = [
+/// Colours that remain distinct for all kinds of sight (M. Okabe and K. Ito 2008), and brown.
+const PALETTE: [RGBColor; 9] = [
     RGBColor(0, 0, 0),
     RGBColor(230, 159, 0),
     RGBColor(86, 180, 233),
@@ -40,6 +40,7 @@ const PALETTE: [RGBColor; 8] = [
     RGBColor(204, 121, 167),
     RGBColor(213, 94, 0),
     RGBColor(120, 94, 240),
+    RGBColor(125, 75, 35),
 ];
 
 const FONT: &str = "sans-serif";
@@ -47,7 +48,7 @@ const FONT: &str = "sans-serif";
 /// How a series is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
-    /// Dots in a colour of their own, joined in their order.
+    /// Dots in a colour of their own, joined in their order; open dots once all colours are used.
     Curve,
     /// Dots in a colour of their own.
     Dots,
@@ -243,7 +244,8 @@ fn line_style(style: Style, number: usize) -> Option<ShapeStyle> {
 /// Radius and style of the dots of a series.
 fn dot_style(style: Style, number: usize) -> Option<(i32, ShapeStyle)> {
     match style {
-        Style::Curve => Some((4, colour(number).filled())),
+        Style::Curve if number < PALETTE.len() => Some((4, colour(number).filled())),
+        Style::Curve => Some((5, colour(number).stroke_width(2))),
         Style::Dots => Some((6, colour(number).filled())),
         Style::Front | Style::Limit => None,
         Style::Ring => Some((10, RGBColor(200, 0, 0).stroke_width(3))),

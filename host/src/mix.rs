@@ -142,17 +142,25 @@ pub fn mix(
         })
         .collect();
     for setting in only.iter().chain(set) {
-        let tag = lights.iter().position(|light| light.name == setting.light);
-        let tag = tag.ok_or_else(|| MixError::UnknownLight {
-            name: setting.light.clone(),
-            known: listed(lights),
-        })?;
+        let tag = find(lights, &setting.light)?;
         mix[tag] = setting.value.weight(lights[tag].emission);
         if mix[tag].max_channel() > LARGEST_WEIGHT {
             return Err(MixError::TooBright(setting.light.clone()));
         }
     }
     Ok(mix)
+}
+
+/// The tag of a light, by its name.
+///
+/// # Errors
+/// [`MixError::UnknownLight`].
+pub fn find(lights: &[SolutionLight], name: &str) -> Result<usize, MixError> {
+    let tag = lights.iter().position(|light| light.name == name);
+    tag.ok_or_else(|| MixError::UnknownLight {
+        name: name.to_owned(),
+        known: listed(lights),
+    })
 }
 
 /// The first names, and how many more there are.

@@ -12,8 +12,9 @@ use relume::form_factor::{self, Shooter};
 use relume::geometry::{Polygon, from_unit_square};
 use relume::luminaire;
 use relume::mesh::Mesh;
-use relume::scene::Luminaire;
-use relume::visibility::{Occluders, Shaft};
+use relume::refine::Refinement;
+use relume::scene::{Luminaire, Scene};
+use relume::visibility::{Occluders, Shaft, Visibility};
 
 use crate::bvh::{Bvh, Narrowed, lifted};
 use crate::noise;
@@ -37,6 +38,9 @@ const RAYS_PER_ELEMENT: u32 = 64;
 
 /// Fills rows.
 pub trait RowFiller {
+    /// Who sees whom.
+    fn visibility(&self) -> &impl Visibility;
+
     /// Direct irradiance of every element by a luminaire at unit emission, W/m2.
     fn luminaire(&self, mesh: &Mesh, luminaire: &Luminaire, far: f32, row: &mut [f32]);
 
@@ -55,6 +59,44 @@ pub trait RowFiller {
     fn lamp(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
         self.shooter(mesh, polygon, row);
     }
+
+    /// Estimates of the form factors from every element to a polygon.
+    fn estimate(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
+        let shooter = Shooter::new(*polygon);
+        form_factor::estimate(mesh, &shooter, 0, self.visibility(), row);
+    }
+}
+
+/// Estimates the rows that a refinement misses ([`Refinement::close`]) and solves with them.
+///
+/// Where there is no room for all rows nothing changes.
+pub fn close<const K: usize>(
+    refinement: &mut Refinement<K>,
+    mesh: &Mesh,
+    scene: &Scene,
+    filler: &impl RowFiller,
+) {
+    let is_closed = luminaire::is_closed(mesh, luminaire::far(scene), filler.visibility());
+    let dark = is_closed.then(|| dark_shares(mesh, scene, filler));
+    refinement.close(dark.as_deref(), |patch, row| {
+        if let Some(polygon) = mesh.patch_polygon(patch) {
+            filler.estimate(mesh, &polygon, row);
+        }
+    });
+    refinement.finish();
+}
+
+/// What share of every element's view has no patches.
+fn dark_shares(mesh: &Mesh, scene: &Scene, filler: &impl RowFiller) -> Vec<f32> {
+    let mut dark = vec![0.0; mesh.elements.len()];
+    let mut row = dark.clone();
+    for side in mesh.dark_sides(scene.surfaces()) {
+        filler.estimate(mesh, &side, &mut row);
+        for (sum, factor) in dark.iter_mut().zip(&row) {
+            *sum += factor;
+        }
+    }
+    dark
 }
 
 /// The solver alone, by brute force: what a device does.
@@ -65,6 +107,10 @@ pub struct Serial<'a>(
 );
 
 impl RowFiller for Serial<'_> {
+    fn visibility(&self) -> &impl Visibility {
+        &self.0
+    }
+
     fn luminaire(&self, mesh: &Mesh, luminaire: &Luminaire, far: f32, row: &mut [f32]) {
         luminaire::fill(mesh, luminaire, far, 0, &self.0, row);
     }
@@ -109,6 +155,10 @@ impl<'a> Parallel<'a> {
 }
 
 impl RowFiller for Parallel<'_> {
+    fn visibility(&self) -> &impl Visibility {
+        self.bvh
+    }
+
     fn luminaire(&self, mesh: &Mesh, luminaire: &Luminaire, far: f32, row: &mut [f32]) {
         row.par_chunks_mut(CHUNK)
             .enumerate()
@@ -121,7 +171,18 @@ impl RowFiller for Parallel<'_> {
     fn shooter(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
         let shooter = Shooter::new(*polygon);
         self.fill(row, |receiver, range| {
-            self.factors(mesh, &shooter, receiver, range)
+            self.factors(mesh, &shooter, receiver, range, |element, seen| {
+                shooter.form_factor(element, seen)
+            })
+        });
+    }
+
+    fn estimate(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
+        let shooter = Shooter::new(*polygon);
+        self.fill(row, |receiver, range| {
+            self.factors(mesh, &shooter, receiver, range, |element, seen| {
+                shooter.estimate(element, seen)
+            })
         });
     }
 
@@ -154,12 +215,16 @@ impl Parallel<'_> {
         shooter: &Shooter,
         receiver: &Polygon,
         range: &Range<usize>,
+        factor: impl Fn(&Polygon, &Narrowed) -> f32,
     ) -> Vec<f32> {
         if shooter.is_out_of_sight(receiver) {
             return Vec::new();
         }
         let narrowed = self.bvh.narrowed(&shaft(shooter.polygon(), receiver));
-        self.element_factors(mesh, shooter, range, &narrowed)
+        let receivers = self.receivers(mesh, range);
+        receivers
+            .map(|receiver| factor(&receiver, &narrowed))
+            .collect()
     }
 
     /// The same. Where much stands between, rays look for a way to the lamp; if one gets through, the lamp is
@@ -187,7 +252,10 @@ impl Parallel<'_> {
             return Vec::new();
         }
         if !is_many || depth == MOST_QUARTERINGS {
-            return self.element_factors(mesh, &shooter, range, &narrowed);
+            let receivers = self.receivers(mesh, range);
+            return receivers
+                .map(|receiver| shooter.form_factor(&receiver, &narrowed))
+                .collect();
         }
         let mut sum = vec![0.0; range.len()];
         for quarter in quarters(lamp) {
@@ -225,19 +293,12 @@ impl Parallel<'_> {
         })
     }
 
-    fn element_factors(
-        &self,
-        mesh: &Mesh,
-        shooter: &Shooter,
-        range: &Range<usize>,
-        visibility: &Narrowed,
-    ) -> Vec<f32> {
+    /// Outlines of the elements of one patch.
+    fn receivers(&self, mesh: &Mesh, range: &Range<usize>) -> impl Iterator<Item = Polygon> {
         let elements = self.elements[range.clone()].iter();
         elements
             .filter_map(|element| mesh.elements.get(*element as usize))
             .filter_map(|element| mesh.element_polygon(element))
-            .map(|receiver| shooter.form_factor(&receiver, visibility))
-            .collect()
     }
 }
 

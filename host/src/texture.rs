@@ -11,9 +11,11 @@
 //! Files hold sRGB (IEC 61966-2-1); it is decoded before anything is averaged.
 
 use std::io::Cursor;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use glam::{Vec2, Vec3};
+use image::error::{LimitError, LimitErrorKind};
+use image::{DynamicImage, ImageDecoder, ImageError};
 use relume::color::Rgb;
 use relume::geometry::clip;
 
@@ -29,6 +31,9 @@ const SAMPLES: u32 = 4096;
 
 /// What a decoder may allocate for one image, in bytes.
 const MOST_BYTES: u64 = 1 << 29;
+
+/// Largest number of texels of an image: 8192 x 8192, which are 0.8 GB as they are kept.
+pub const LARGEST_IMAGE: u64 = 1 << 26;
 
 /// An image in linear RGB.
 #[derive(Debug)]
@@ -46,15 +51,20 @@ impl Image {
     ///
     /// # Errors
     /// What the decoder says: damaged, of another format, or too large.
-    pub fn decode(bytes: &[u8]) -> Result<Self, image::ImageError> {
+    pub fn decode(bytes: &[u8]) -> Result<Self, ImageError> {
         let mut reader = image::ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
         let mut limits = image::Limits::default();
         limits.max_alloc = Some(MOST_BYTES);
         reader.limits(limits);
-        let encoded = reader.decode()?.into_rgb16();
+        let decoder = reader.into_decoder()?;
+        let (width, height) = decoder.dimensions();
+        if u64::from(width) * u64::from(height) > LARGEST_IMAGE {
+            let too_large = LimitErrorKind::DimensionError;
+            return Err(ImageError::Limits(LimitError::from_kind(too_large)));
+        }
+        let encoded = DynamicImage::from_decoder(decoder)?.into_rgb16();
 
-        let linear: Vec<f32> = (0..=u16::MAX).map(linear_from_srgb).collect();
-        let decode = |code: u16| linear.get(usize::from(code)).copied().unwrap_or_default();
+        let decode = |code: u16| LINEAR.get(usize::from(code)).copied().unwrap_or_default();
         Ok(Self {
             width: encoded.width() as usize,
             height: encoded.height() as usize,
@@ -83,6 +93,10 @@ impl Image {
         texel.copied().unwrap_or_default()
     }
 }
+
+/// The linear light of every code.
+static LINEAR: LazyLock<Vec<f32>> =
+    LazyLock::new(|| (0..=u16::MAX).map(linear_from_srgb).collect());
 
 /// The sRGB transfer function, from code to linear light.
 fn linear_from_srgb(code: u16) -> f32 {

@@ -218,6 +218,19 @@ pub fn far(scene: &Scene) -> f32 {
     2.0 * scene.diagonal()
 }
 
+/// True when no light escapes: none of 64 rays from the middle of any patch that has elements goes on for ever.
+///
+/// `far` as for [`irradiance`]. A gap is overlooked when it fills much less than a ray of any middle's view.
+#[must_use]
+pub fn is_closed(mesh: &Mesh, far: f32, visibility: &impl Visibility) -> bool {
+    let patches = (0..mesh.patches.len() as u32).filter(|patch| mesh.receives(*patch));
+    let mut polygons = patches.filter_map(|patch| mesh.patch_polygon(patch));
+    polygons.all(|polygon| {
+        let (middle, normal) = (polygon.center(), polygon.normal());
+        at_point(&Source::Sky, middle, normal, far, 1, visibility) <= 0.0
+    })
+}
+
 /// Fills `row[j]` with the direct irradiance of element `first + j`, W/m2 at unit emission.
 ///
 /// The luminaire's share is not applied. Elements beyond the mesh get 0.

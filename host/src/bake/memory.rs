@@ -41,6 +41,15 @@ impl<const K: usize> Memory<K> {
         }
     }
 
+    /// Bytes that keep rows and solve for their patches; without kept rows there are none.
+    #[must_use]
+    pub fn row_bytes(&self) -> usize {
+        let lanes =
+            [&self.sources, &self.sent, &self.work].map(|lanes| size_of_val(lanes.as_slice()));
+        let rows = size_of_val(self.factors.as_slice()) + size_of_val(self.shares.as_slice());
+        rows + lanes.iter().sum::<usize>()
+    }
+
     /// The memory as the refinement borrows it.
     #[must_use]
     pub fn storage(&mut self) -> Storage<'_, K> {

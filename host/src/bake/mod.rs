@@ -49,13 +49,13 @@ pub struct Settings {
     pub residual: f32,
     /// Stop after so many distinct rows and passes of rays, or so many shots of a plain refinement.
     pub shots: Option<u32>,
-    /// As published: patches shoot, none is divided, no row is kept and no ambient term is added.
+    /// As published: patches shoot, none is divided, and no row is kept.
     pub plain: bool,
     /// Estimated relative L1 error of the worst light to meet, by the length of the elements and the
     /// number of rays; `None` for elements and rays as the other settings have them.
     pub error: Option<f32>,
-    /// Plain shots: add the ambient term all the same.
-    pub ambient: bool,
+    /// What stands for rows that are missing in the end.
+    pub missing: Missing,
     /// Relative L1 error, of the worst light, that the rays may leave.
     pub noise: f32,
     /// Relative variation of direct light inside a patch above which it is divided to shoot.
@@ -75,13 +75,25 @@ impl Default for Settings {
             shots: None,
             plain: false,
             error: None,
-            ambient: false,
+            missing: Missing::Closed,
             noise: 0.005,
             variation: 0.15,
             split_direct: false,
             method: Method::Gather,
         }
     }
+}
+
+/// What stands for rows that are missing when shooting ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Missing {
+    /// Nothing, as published.
+    Nothing,
+    /// The ambient term (Cohen et al. 1988).
+    Ambient,
+    /// Estimated rows ([`relume::refine::Refinement::close`]); the ambient term where memory does not hold all
+    /// rows, and nothing in a plain refinement, which keeps none.
+    Closed,
 }
 
 /// How far a bake has come.
@@ -407,6 +419,7 @@ fn solution(
         surfaces: scene.surfaces.iter().map(|s| *s.polygon()).collect(),
         luminaires: scene.luminaires.clone(),
         mesh: mesh::placed(&solved.mesh, &scene.surfaces),
+        image: None,
         lights: lights
             .map(|((light, residual), error)| SolutionLight {
                 name: light.name.clone(),
@@ -481,7 +494,7 @@ mod tests {
         shots: None,
         plain: false,
         error: None,
-        ambient: false,
+        missing: Missing::Closed,
         noise: 1e-9,
         variation: 0.15,
         split_direct: false,

@@ -1,13 +1,14 @@
-//! Bounces that patches shoot along rows of form factors, through the solver's refinement.
+//! Bounces that patches shoot along rows of form factors, through the solver's refinement; rows that are missing when
+//! it ends, at the residual or early, are estimated.
 
 use relume::color::Rgb;
 use relume::mesh::Mesh;
 use relume::refine::{Choice, Refinement};
 
 use super::direct::{self, DirectSource, Lamps};
-use super::{BakeError, Job, LANES, Memory, Settings, Solved};
+use super::{BakeError, Job, LANES, Memory, Missing, Settings, Solved};
 use crate::mesh::{Direct, OwnedMesh, Split, split};
-use crate::rows::RowFiller;
+use crate::rows::{self, RowFiller};
 
 /// Most bytes of kept rows.
 const ROW_BYTES: usize = 4 << 30;
@@ -17,6 +18,10 @@ const LAMP_BYTES: usize = 1 << 30;
 
 /// Most shooters that patches are divided into, for each of them.
 const SHOOTERS_PER_PATCH: usize = 3;
+
+/// Relative L1 error of what light brings that travels along estimated rows: 0.4 to 2 % for nearly all lights of
+/// eight scenes, whatever number of rows is known.
+const ESTIMATE_ERROR: f32 = 0.02;
 
 /// A row of direct light that waits to be shot.
 struct Held {
@@ -113,7 +118,61 @@ pub(super) fn refine<F: RowFiller>(
         refinement.shoot(patch, &row)?;
     }
     refinement.finish();
-    Ok(read_out(&mesh, lights as u32, settings, &refinement))
+    let mut left = Left::of(&refinement, &mesh, lights as u32, settings);
+    let misses_rows = rows == p && refinement.rows_evaluated() < most;
+    if misses_rows && settings.missing == Missing::Closed {
+        rows::close(&mut refinement, &mesh.view(), job.scene, &filler);
+        left.close();
+    }
+    Ok(read_out(&mesh, lights as u32, settings, left, &refinement))
+}
+
+/// What is left of every light when shooting ends.
+struct Left {
+    residuals: Vec<f32>,
+    errors: Vec<f32>,
+    ambient: Vec<Rgb>,
+}
+
+impl Left {
+    fn of(
+        refinement: &Refinement<LANES>,
+        mesh: &OwnedMesh,
+        lights: u32,
+        settings: &Settings,
+    ) -> Self {
+        // What is left of a light that has shot its share and met nothing will meet nothing either.
+        let is_lost = |light: u32| {
+            let meets = |element| refinement.irradiance(element, light) != Rgb::BLACK;
+            refinement.light_residual(light) <= settings.residual
+                && !(0..mesh.elements.len() as u32).any(meets)
+        };
+        let is_ignored = match settings.missing {
+            Missing::Nothing => true,
+            Missing::Ambient => false,
+            Missing::Closed => settings.plain,
+        };
+        let ambient = |light| {
+            if is_ignored || is_lost(light) {
+                Rgb::BLACK
+            } else {
+                refinement.ambient(light)
+            }
+        };
+        Self {
+            residuals: (0..lights).map(|l| refinement.light_residual(l)).collect(),
+            errors: (0..lights).map(|l| refinement.light_error(l)).collect(),
+            ambient: (0..lights).map(ambient).collect(),
+        }
+    }
+
+    /// Estimated rows take the place of the ambient term.
+    fn close(&mut self) {
+        for error in &mut self.errors {
+            *error *= ESTIMATE_ERROR;
+        }
+        self.ambient.fill(Rgb::BLACK);
+    }
 }
 
 /// Adds the sum over the channels of a row of direct light.
@@ -125,28 +184,15 @@ fn add_direct(irradiance: &mut [f32], lights: usize, direct: &direct::DirectRow)
     }
 }
 
-/// Reads the contributions out of the refinement; what is still unshot enters as ambient light.
+/// Reads the contributions out of the refinement.
 fn read_out(
     mesh: &OwnedMesh,
     lights: u32,
     settings: &Settings,
+    left: Left,
     refinement: &Refinement<LANES>,
 ) -> Solved {
     let elements = mesh.elements.len() as u32;
-    // What is left of a light that has shot its share and met nothing will meet nothing either.
-    let is_lost = |light: u32| {
-        let meets = |element| refinement.irradiance(element, light) != Rgb::BLACK;
-        refinement.light_residual(light) <= settings.residual && !(0..elements).any(meets)
-    };
-    let ambient: Vec<Rgb> = (0..lights)
-        .map(|light| {
-            if (settings.plain && !settings.ambient) || is_lost(light) {
-                Rgb::BLACK
-            } else {
-                refinement.ambient(light)
-            }
-        })
-        .collect();
     let collect = |value: &dyn Fn(u32, u32) -> Rgb| -> Vec<Rgb> {
         (0..elements)
             .flat_map(|element| (0..lights).map(move |light| (element, light)))
@@ -155,13 +201,13 @@ fn read_out(
     };
     Solved {
         contributions: collect(&|element, light| {
-            refinement.irradiance(element, light) + ambient[light as usize]
+            refinement.irradiance(element, light) + left.ambient[light as usize]
         }),
         direct: settings
             .split_direct
             .then(|| collect(&|element, light| refinement.direct(element, light))),
-        residuals: (0..lights).map(|l| refinement.light_residual(l)).collect(),
-        errors: (0..lights).map(|l| refinement.light_error(l)).collect(),
+        residuals: left.residuals,
+        errors: left.errors,
         rows: refinement.rows_evaluated(),
         mesh: mesh.clone(),
     }

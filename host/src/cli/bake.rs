@@ -47,10 +47,10 @@ pub struct Arguments {
     /// Meet this estimated relative error for every light, with elements and rays that are just enough
     #[arg(long, value_name = "E", value_parser = share, conflicts_with_all = ["shots", "plain"])]
     error: Option<f32>,
-    /// Stop after so many distinct rows and passes of 16 rays (plain shots with --plain)
+    /// Stop after so many distinct rows, the others being estimated, and passes of 16 rays (plain shots with --plain)
     #[arg(long, value_name = "N")]
     shots: Option<u32>,
-    /// As published: rows are not kept, and no ambient term stands for what is left
+    /// As published: rows are not kept, and nothing stands for what is left
     #[arg(long)]
     plain: bool,
     /// Keep direct and indirect light apart

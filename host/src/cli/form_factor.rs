@@ -38,11 +38,16 @@ enum Method {
 }
 
 /// One pair.
-struct Case {
-    name: String,
-    from: ConvexPolygon,
-    to: ConvexPolygon,
-    blockers: Vec<ConvexPolygon>,
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// What it is called.
+    pub name: String,
+    /// Whose light is followed.
+    pub from: ConvexPolygon,
+    /// Where it may arrive.
+    pub to: ConvexPolygon,
+    /// What may be in between.
+    pub blockers: Vec<ConvexPolygon>,
 }
 
 /// A case's answer and the time that it took.
@@ -53,7 +58,7 @@ struct Answer {
 
 pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     let file = arguments.input.display();
-    let cases = parse(&read(&arguments.input)?).with_context(|| file.to_string())?;
+    let cases = read_cases(&read(&arguments.input)?).with_context(|| file.to_string())?;
     let answers: Vec<Answer> = cases
         .iter()
         .map(|case| {
@@ -77,8 +82,11 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     }))
 }
 
-/// The cases of a file; the error names the case, and what to do.
-fn parse(bytes: &[u8]) -> Result<Vec<Case>> {
+/// The cases of a JSON file for `relume form-factor`.
+///
+/// # Errors
+/// One line that names the case, and says what to do.
+pub fn read_cases(bytes: &[u8]) -> Result<Vec<Case>> {
     let value: Value = serde_json::from_slice(bytes)
         .map_err(|error| anyhow!("not JSON ({error}); write {{\"cases\": [...]}}"))?;
     let Some(cases) = value.get("cases").and_then(Value::as_array) else {

@@ -4,10 +4,13 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use relume::atlas::{Atlas, Quantity};
+use relume::atlas::{Atlas, LARGEST_SIDE, Quantity, Tiles};
+use relume::code::{Curve, LOG_STEPS};
+use relume::relight::FixedWeight;
 use serde_json::{Value, json};
 
 use super::load::{Loaded, load};
+use super::pack::bits as bits_per_rgb;
 use super::{Outcome, human_bytes, tell};
 use crate::solution::{self, Solution};
 
@@ -28,6 +31,16 @@ pub fn run(arguments: &Arguments) -> Result<Outcome> {
 }
 
 fn of_solution(solution: &Solution) -> Value {
+    if let Some([width, height]) = solution.image {
+        let names = solution.lights.iter().map(|light| &light.name);
+        return json!({
+            "kind": "picture",
+            "width": width,
+            "height": height,
+            "lights": solution.lights.len(),
+            "names": names.collect::<Vec<_>>(),
+        });
+    }
     let lights = solution.lights.iter().map(|light| {
         json!({
             "name": light.name,
@@ -55,17 +68,29 @@ fn of_solution(solution: &Solution) -> Value {
 }
 
 /// Errors are those that were measured when it was packed, null if they were not, in display codes.
-/// Flash is the atlas itself; RAM and work are those of the integer kernel: three `u32` sums per
-/// element, three `u16` weights per light, one multiply-add per code and channel.
+/// Flash is the atlas itself; RAM and work are those of the integer kernel that multiplies: three `u32` sums per
+/// element, a [`FixedWeight`] per light, one multiply-add per code and channel. A light in tiles costs that only where its
+/// codes are not all 0.
 fn of_atlas(atlas: &Atlas, bytes: usize) -> Value {
-    let lights = atlas.lights().map(|light| {
+    let tiled = bits_in_tiles(atlas);
+    let elements = atlas.element_count() as usize;
+    let lights = atlas.lights().zip(tiled).map(|(light, tiled)| {
+        let bits = if light.code.is_tiled() {
+            tiled as f64 / elements.max(1) as f64
+        } else {
+            8.0 * light.code.bytes() as f64
+        };
         json!({
             "name": light.name,
             "emission": light.emission.to_array(),
-            "scale": light.scale.value(),
+            "code": light.code.name(),
+            "curves": light.curves.map(curve),
+            "bits_per_rgb": bits,
             "max_error_codes": light.error,
         })
     });
+    let mut products = 0_u64;
+    atlas.for_each(|_, _, _| products += 3);
     let worst = atlas.worst_error();
     let (n, k) = (
         u64::from(atlas.element_count()),
@@ -74,24 +99,53 @@ fn of_atlas(atlas: &Atlas, bytes: usize) -> Value {
     json!({
         "kind": "atlas",
         "bytes": bytes,
-        "code": atlas.code().name(),
-        "channels": atlas.channels().count(),
         "quantity": match atlas.quantity() {
             Quantity::Irradiance => "irradiance",
             Quantity::Radiosity => "radiosity",
+            Quantity::Radiance => "radiance",
         },
         "elements": n,
         "faces": atlas.mesh().map_or(0, |mesh| mesh.face_count()),
         "max_error_codes": worst.map(|worst| worst.packed),
         "codes_shown": worst.map(|worst| worst.shown),
-        "code_bytes": atlas.all_codes().len(),
+        "code_bytes": atlas.code_bytes(),
         "flash": bytes,
-        "ram": n * 12 + k * 6,
-        "multiply_adds_per_frame": n * k * 3,
+        "bits_per_rgb": bits_per_rgb(atlas.code_bytes(), (n * k) as usize),
+        "ram": n * 12 + k * size_of::<FixedWeight>() as u64,
+        "multiply_adds_per_frame": products,
         "multiply_adds_per_changed_light": n * 3,
         "lights": k,
         "per_light": lights.collect::<Vec<_>>(),
     })
+}
+
+/// What the codes of a channel stand for, in display codes and W/m2.
+fn curve(curve: Curve) -> Value {
+    match curve {
+        Curve::Exponential { scale } => json!({"scale": scale.value()}),
+        Curve::Display { white, first, step } => json!({
+            "white": white.value(),
+            "first": Curve::display_codes(first),
+            "step": Curve::display_codes(step),
+        }),
+        Curve::Logarithmic { .. } => json!({"steps_per_octave": LOG_STEPS}),
+    }
+}
+
+/// Bits of every light in all tiles, without their offsets.
+fn bits_in_tiles(atlas: &Atlas) -> Vec<usize> {
+    let mut bits = vec![0; atlas.light_count() as usize];
+    let mut block = [[0; 3]; LARGEST_SIDE * LARGEST_SIDE];
+    for (place, mut tile) in atlas.tiles().iter().flat_map(Tiles::iter) {
+        for (bits, light) in bits.iter_mut().zip(atlas.lights()) {
+            if light.code.is_tiled() {
+                let before = tile.remaining();
+                tile.next_light(place, light.last, &mut block);
+                *bits += before.saturating_sub(tile.remaining());
+            }
+        }
+    }
+    bits
 }
 
 /// The report as lines for people; lists as one line per entry.

@@ -6,22 +6,22 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use relume::atlas::{Atlas, Channels, Quantity};
-use relume::code::Code;
+use relume::atlas::{Atlas, Quantity};
 use relume::color::Rgb;
 use serde_json::json;
 use thiserror::Error;
 use tiny_skia::Pixmap;
 
 use super::bake::{Baked, is_interrupted, watched};
+use super::pack::{MAX_ERROR, bits};
 use super::relight::BACKGROUND;
 use super::{Outcome, human_bytes, tell, write_file};
 use crate::bake::{Settings, bake_keeping};
 use crate::builtin::{Builtin, cornell_box};
-use crate::display_error::max_codes;
+use crate::display_error::{Mixed, Solo, max_codes};
 use crate::export::exr;
 use crate::mix::{Setting, mix};
-use crate::pack::{Format, PackingError, pack_measured, relight_atlas};
+use crate::pack::{Aim, Choice, Packing, PackingError, Request, choose, relight_atlas};
 use crate::picture::{self, Exposure, LinearImage, Tile, error_map, sheet};
 use crate::preview::{Camera, Relit, Viewpoint, render, show};
 use crate::solution::{self, Solution};
@@ -159,13 +159,18 @@ fn make(folder: &mut Folder) -> Result<serde_json::Value> {
     };
     let baked = watched(|watch| bake_keeping(&scene, &settings, watch))?.ok_or(Interrupted)?;
     let solution = &baked.solution;
-    let format = Format {
-        code: Code::Exp8s,
-        channels: Channels::Rgb,
+    let request = Request {
+        aim: Aim::Error(MAX_ERROR),
+        given: &vec![None; solution.lights.len()],
         quantity: Quantity::Irradiance,
         mesh: true,
     };
-    let (atlas_bytes, mut error) = pack_measured(solution, format)?;
+    let Choice {
+        bytes: atlas_bytes,
+        mut error,
+        packing,
+        ..
+    } = choose(solution, request)?;
     let solution_bytes = solution::write(solution);
     let atlas = Atlas::parse(&atlas_bytes)?;
 
@@ -185,8 +190,8 @@ fn make(folder: &mut Folder) -> Result<serde_json::Value> {
     };
     let relightings = pictures(&stage, folder)?;
     for relit in &relightings {
-        if relit.max_codes > error.codes {
-            error.codes = relit.max_codes;
+        if relit.max_codes > error.all.packed {
+            error.all.packed = relit.max_codes;
             error.worst_state.clone_from(&relit.name);
         }
     }
@@ -195,6 +200,7 @@ fn make(folder: &mut Folder) -> Result<serde_json::Value> {
         &baked,
         &error,
         &relightings,
+        (packing, &atlas),
         atlas_bytes.len(),
         solution_bytes.len(),
     );
@@ -213,10 +219,13 @@ fn make(folder: &mut Folder) -> Result<serde_json::Value> {
             "residual": baked.residual(),
             "bake_seconds": baked.time.as_secs_f64(),
             "atlas_bytes": atlas_bytes.len(),
-            "code_bytes": atlas.all_codes().len(),
+            "code_bytes": atlas.code_bytes(),
             "solution_bytes": solution_bytes.len(),
-            "max_error_codes": error.codes,
-            "codes_shown": error.codes_shown,
+            "code": packing.code.name(),
+            "max_error_codes": error.all.packed,
+            "codes_shown": error.all.shown,
+            "achromatic_codes": error.achromatic.packed,
+            "achromatic_shown": error.achromatic.shown,
             "worst_state": error.worst_state,
             "per_light": per_light(solution, &error),
             "mixes": relightings.iter().map(|r| json!({
@@ -260,7 +269,7 @@ fn pictures(stage: &Stage, folder: &mut Folder) -> Result<Vec<Relighting>> {
             caption: format!("{} (error {:.1} codes)", relit.name, relit.max_codes),
         })
         .collect();
-    let title = "One bake, three lights, any mix: relit from 8-bit codes";
+    let title = "One bake, three lights, any mix: relit from the atlas";
     folder.png("overview.png", &sheet(&tiles, 4, title)?)?;
     Ok(relightings)
 }
@@ -288,7 +297,6 @@ fn per_light(solution: &Solution, error: &PackingError) -> Vec<serde_json::Value
                 "name": light.name,
                 "residual": light.residual,
                 "max_error_codes": codes,
-                "code_bytes": solution.mesh.elements.len() * 3,
             })
         })
         .collect()
@@ -298,6 +306,7 @@ fn report(
     baked: &Baked,
     error: &PackingError,
     relightings: &[Relighting],
+    (packing, atlas): (Packing, &Atlas),
     atlas_bytes: usize,
     solution_bytes: usize,
 ) -> String {
@@ -318,20 +327,21 @@ fn report(
         "solution {}, atlas {} (codes {}, the rest is mesh)",
         human_bytes(solution_bytes),
         human_bytes(atlas_bytes),
-        human_bytes(elements * solution.lights.len() * 3),
+        human_bytes(atlas.code_bytes()),
+    ));
+    line(format!(
+        "codes: {packing}, {:.2} bits per element and light",
+        bits(atlas.code_bytes(), solution.contributions.len()),
     ));
     line(String::new());
     line(format!(
-        "{:<12} {:>9} {:>14} {:>10}",
-        "light", "residual", "error (codes)", "codes"
+        "{:<12} {:>9} {:>14}",
+        "light", "residual", "error (codes)"
     ));
     for (light, codes) in solution.lights.iter().zip(&error.per_light) {
         line(format!(
-            "{:<12} {:>9.1e} {:>14.2} {:>10}",
-            light.name,
-            light.residual,
-            codes,
-            human_bytes(elements * 3),
+            "{:<12} {:>9.1e} {:>14.2}",
+            light.name, light.residual, codes,
         ));
     }
     line(String::new());
@@ -348,10 +358,10 @@ fn report(
     line(String::new());
     line(format!(
         "worst of these and of {} test states against f32: {:.2} display codes ({}), {:.2} as shown",
-        1 + solution.lights.len() + 64,
-        error.codes,
+        Mixed::all().count() + Solo::ALL.len() * solution.lights.len(),
+        error.all.packed,
         error.worst_state,
-        error.codes_shown,
+        error.all.shown,
     ));
     text
 }

@@ -7,12 +7,18 @@ use anyhow::{Context, Result, anyhow, bail};
 use relume::atlas::{Atlas, Quantity};
 use relume::color::Rgb;
 
+use super::tell;
+use crate::export::exr::read_light_layers;
+use crate::export::light_layers::contributions;
 use crate::pack::{relight_atlas, unpack};
 use crate::solution::{self, Solution};
 
+/// How an OpenEXR file starts.
+const EXR: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
+
 /// What a file holds.
 pub enum Loaded {
-    /// Contributions in `f32`.
+    /// Contributions in `f32`; those of a picture with a layer per light are radiances.
     Solution(Solution),
     /// Packed contributions, decoded, and the bytes that they came from.
     Atlas {
@@ -32,15 +38,25 @@ pub fn load(path: &Path) -> Result<Loaded> {
         let solution = solution::read(&bytes).with_context(|| path.display().to_string())?;
         return Ok(Loaded::Solution(solution));
     }
+    if bytes.starts_with(&EXR) {
+        let (solution, repaired) = contributions(&read_light_layers(path)?);
+        if repaired > 0 {
+            tell!(
+                "{}: {repaired} values were negative or not finite; they are dark now",
+                path.display()
+            );
+        }
+        return Ok(Loaded::Solution(solution));
+    }
     if !bytes.starts_with(&relume::atlas::MAGIC) {
         bail!(
-            "{}: neither a solution nor an atlas; make one with `relume bake` or `relume pack`",
+            "{}: neither a solution nor an atlas, nor an OpenEXR picture; make one with `relume bake` or `relume pack`",
             path.display()
         );
     }
     let atlas = Atlas::parse(&bytes).with_context(|| path.display().to_string())?;
     Ok(Loaded::Atlas {
-        solution: unpack(&atlas),
+        solution: unpack(&atlas).with_context(|| path.display().to_string())?,
         quantity: atlas.quantity(),
         bytes,
     })

@@ -4,6 +4,7 @@
 //! limit is hit (one line), 2 wrong usage, 130 interrupted with a valid result.
 
 mod bake;
+mod export;
 mod form_factor;
 mod info;
 mod job;
@@ -19,6 +20,8 @@ use std::process::ExitCode;
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
 use serde_json::Value;
+
+pub use form_factor::{Case, read_cases};
 
 use crate::file::write_whole;
 
@@ -50,6 +53,8 @@ enum Command {
     FormFactor(form_factor::Arguments),
     /// What a solution or atlas holds, and what it costs on a device
     Info(info::Arguments),
+    /// What firmware links: an atlas as Rust or C source, or as bytes
+    Export(export::Arguments),
     /// Published methods beside ours, measured
     Study(study::Arguments),
 }
@@ -81,6 +86,7 @@ pub fn run() -> ExitCode {
         Some(Command::Probe(arguments)) => probe::run(&arguments, cli.json),
         Some(Command::FormFactor(arguments)) => form_factor::run(&arguments, cli.json),
         Some(Command::Info(arguments)) => info::run(&arguments),
+        Some(Command::Export(arguments)) => export::run(&arguments),
         Some(Command::Study(arguments)) => study::run(&arguments),
     };
     let written = outcome.and_then(|outcome| {

@@ -14,7 +14,7 @@ use super::{Outcome, keep, output_path, tell, write_file};
 use crate::export::exr;
 use crate::mesh::OwnedMesh;
 use crate::mix::{Setting, mix};
-use crate::picture::{self, Exposure};
+use crate::picture::{self, Exposure, LinearImage, to_pixmap};
 use crate::preview::{Camera, CameraError, Relit, Viewpoint, render, show};
 
 /// Behind everything.
@@ -79,6 +79,14 @@ fn size(text: &str) -> Result<(u32, u32), String> {
 }
 
 impl CameraArguments {
+    const fn is_given(&self) -> bool {
+        self.camera.is_some()
+            || self.eye.is_some()
+            || self.target.is_some()
+            || self.up.is_some()
+            || self.fov.is_some()
+    }
+
     fn viewpoint(&self, loaded: &Loaded, aspect: f32) -> Result<Viewpoint> {
         if let Some(file) = &self.camera {
             return Ok(Viewpoint::from_toml_file(file)?);
@@ -126,6 +134,9 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     }
     let loaded = load(&arguments.input)?;
     let solution = loaded.solution();
+    if let Some(size) = solution.image {
+        return relight_picture(arguments, &loaded, size, &output, is_exr);
+    }
     if solution.mesh.faces.is_empty() {
         bail!("{path}: it carries no mesh to draw; pack it without --no-mesh");
     }
@@ -171,6 +182,47 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
             "up": viewpoint.up.to_array(),
             "fov": viewpoint.fov,
         },
+    })))
+}
+
+/// A picture whose pixels are the elements: there is nothing to look for with a camera.
+fn relight_picture(
+    arguments: &Arguments,
+    loaded: &Loaded,
+    [width, height]: [u32; 2],
+    output: &Path,
+    is_exr: bool,
+) -> Result<Outcome> {
+    let path = arguments.input.display().to_string();
+    if arguments.camera.is_given() {
+        bail!("{path}: it is a picture, seen from where it was taken; leave out the camera");
+    }
+    let lights = &loaded.solution().lights;
+    let mix = mix(lights, &arguments.only, &arguments.set).context(path)?;
+    let pixels = loaded.relight(&mix)?;
+    let image = LinearImage {
+        width,
+        height,
+        pixels: pixels.iter().map(|v| [v.r, v.g, v.b, 1.0]).collect(),
+    };
+    let (bytes, exposure) = if is_exr {
+        (exr::encode_rgb(&image)?, None)
+    } else {
+        let factor = arguments.exposure.factor(&image);
+        let pixmap = to_pixmap(&image, factor, BACKGROUND)?;
+        (picture::encode_png(&pixmap)?, Some(factor))
+    };
+    write_file(output, &bytes)?;
+    let exposed = exposure.map_or("linear, unexposed".to_owned(), |e| format!("exposure {e}"));
+    tell!("{}: {width}x{height}, {exposed}", output.display());
+    Ok(Outcome::done(json!({
+        "file": output.display().to_string(),
+        "width": width,
+        "height": height,
+        "exposure": exposure,
+        "mix": lights.iter().zip(&mix).map(|(light, weight)| {
+            json!({"name": light.name, "weight": weight.to_array()})
+        }).collect::<Vec<_>>(),
     })))
 }
 

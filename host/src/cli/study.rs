@@ -3,6 +3,7 @@
 mod accuracy;
 mod paper;
 mod scale;
+mod quantization;
 mod stability;
 mod table;
 
@@ -34,6 +35,8 @@ enum Name {
     Paper,
     /// Time and memory over the number of elements, in a scene of 14 000 polygons (reads RELUME_DATA)
     Scale,
+    /// Formats of contributions: error against number of lights and against bits
+    Quantization,
 }
 
 pub fn run(arguments: &Arguments) -> Result<Outcome> {
@@ -44,6 +47,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome> {
         Name::Stability => stability::run(folder)?,
         Name::Paper => paper::run(folder)?,
         Name::Scale => scale::run(folder)?,
+        Name::Quantization => quantization::run(folder)?,
     };
     Ok(Outcome::done(report))
 }

@@ -1,3 +1,5 @@
-//! Files for other programs.
+//! Files for other programs, and pictures from them.
 
 pub mod exr;
+pub mod firmware;
+pub mod light_layers;

@@ -1,7 +1,7 @@
 //! Why a file was refused: always one line with the file, the place in it and what to do.
 
-use std::io;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 use super::assemble::MAX_LIGHTS;
 use super::draft::MAX_POLYGONS;
@@ -108,10 +108,22 @@ impl ImportError {
 
 /// The bytes of a file.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, ImportError> {
-    std::fs::read(path).map_err(|source| ImportError::Read {
+    fs::read(path).map_err(|source| ImportError::Read {
         path: path.to_owned(),
         source,
     })
+}
+
+/// The bytes of a file that a scene names.
+///
+/// # Errors
+/// Whatever the file system says; devices and pipes, which may never end, are no files.
+pub(super) fn read_named(path: &Path) -> io::Result<Vec<u8>> {
+    if fs::metadata(path)?.is_file() {
+        fs::read(path)
+    } else {
+        Err(io::Error::other("it is no plain file"))
+    }
 }
 
 /// The text of a file.

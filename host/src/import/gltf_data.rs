@@ -13,7 +13,7 @@ use json::accessor::{Accessor, ComponentType};
 use json::validation::Checked;
 use json::{Index, Root};
 
-use super::error::ImportError;
+use super::error::{ImportError, read_named};
 use crate::texture::Image;
 
 /// Base64 of data URIs, whose padding exporters may leave out.
@@ -238,7 +238,7 @@ fn resource(folder: &Path, uri: &str) -> Result<Vec<u8>, String> {
         return Err(format!("{uri:?} is no file; put the data beside the scene"));
     }
     let path = folder.join(percent_decoded(uri));
-    std::fs::read(&path).map_err(|error| format!("{} cannot be read: {error}", path.display()))
+    read_named(&path).map_err(|error| format!("{} cannot be read: {error}", path.display()))
 }
 
 /// A relative URI as a file name (RFC 3986, 2.1).
@@ -362,6 +362,7 @@ mod tests {
             "data:;base64,*",
             "http://x/y",
             "none.bin",
+            "/dev/zero",
             "%",
             "",
         ] {

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use relume::color::Rgb;
 
 use super::draft::{DEFAULT_REFLECTANCE, Glow, Material, exitance, legal_rgb};
-use super::error::{ImportError, read_text};
+use super::error::{ImportError, read_named, read_text};
 use super::obj_text::plain_mtl;
 use super::repairs::Repairs;
 use crate::texture::Image;
@@ -146,7 +146,7 @@ impl Library {
             .unwrap_or(Path::new(""))
             .join(portable(name));
         let image = self.images.entry(path).or_insert_with_key(|path| {
-            let bytes = std::fs::read(path).ok()?;
+            let bytes = read_named(path).ok()?;
             Image::decode(&bytes).ok().map(Arc::new)
         });
         match image {

@@ -273,6 +273,7 @@ pub fn read(bytes: &[u8]) -> Result<Solution, FileError> {
         surfaces,
         luminaires,
         mesh,
+        image: None,
         lights,
         contributions,
         direct,

@@ -72,8 +72,11 @@ pub struct Solution {
     pub surfaces: Vec<Polygon>,
     /// Lights without a surface.
     pub luminaires: Vec<Luminaire>,
-    /// Faces, patches and elements.
+    /// Faces, patches and elements; empty for a picture.
     pub mesh: OwnedMesh,
+    /// Width and height of the picture whose pixels, row by row from the top, are the elements; what lights contribute is
+    /// then radiance. No file of a solution holds one.
+    pub image: Option<[u32; 2]>,
     /// The lights, in the order of their tags.
     pub lights: Vec<SolutionLight>,
     /// Irradiance by a light at unit emission, W/m2; element by element, light inside.
@@ -89,6 +92,15 @@ pub struct Solution {
 }
 
 impl Solution {
+    /// How many elements there are: those of the mesh, or pixels.
+    #[must_use]
+    pub fn element_count(&self) -> usize {
+        self.image
+            .map_or(self.mesh.elements.len(), |[width, height]| {
+                width as usize * height as usize
+            })
+    }
+
     /// Contributions of all lights to one element; empty for a number out of range.
     #[must_use]
     pub fn element(&self, element: usize) -> &[Rgb] {

@@ -15,6 +15,7 @@ use relume::geometry::{Polygon, clip};
 use relume::luminaire;
 use relume::mesh::{Mesh, Side};
 use relume::scene::{Luminaire, Surface};
+use relume::visibility::Visibility;
 
 use crate::bvh::Bvh;
 use crate::mesh::Locator;
@@ -35,6 +36,10 @@ pub struct Hemicube<'a> {
 }
 
 impl RowFiller for Hemicube<'_> {
+    fn visibility(&self) -> &impl Visibility {
+        self.bvh
+    }
+
     fn luminaire(&self, mesh: &Mesh, luminaire: &Luminaire, far: f32, row: &mut [f32]) {
         luminaire::fill(mesh, luminaire, far, 0, self.bvh, row);
     }

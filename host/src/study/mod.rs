@@ -7,6 +7,7 @@ pub mod accuracy;
 pub mod estimates;
 pub mod hemicube;
 pub mod paper;
+pub mod quantization;
 pub mod ray_rows;
 pub mod scale;
 pub mod shooting;

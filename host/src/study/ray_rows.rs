@@ -15,7 +15,7 @@ use relume::geometry::{Polygon, from_unit_square};
 use relume::luminaire;
 use relume::mesh::Mesh;
 use relume::scene::Luminaire;
-use relume::visibility::Visibility as _;
+use relume::visibility::Visibility;
 
 use crate::bvh::Bvh;
 use crate::rows::RowFiller;
@@ -30,6 +30,10 @@ pub struct RayRows<'a> {
 }
 
 impl RowFiller for RayRows<'_> {
+    fn visibility(&self) -> &impl Visibility {
+        self.bvh
+    }
+
     fn luminaire(&self, mesh: &Mesh, luminaire: &Luminaire, far: f32, row: &mut [f32]) {
         luminaire::fill(mesh, luminaire, far, 0, self.bvh, row);
     }

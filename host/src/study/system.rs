@@ -32,8 +32,8 @@ pub struct System {
 /// How a refinement is run.
 #[derive(Clone, Copy, Debug)]
 pub struct Way {
-    /// Rows are kept and the known ones are solved in the end; else every shot counts by itself.
-    pub keeps_rows: bool,
+    /// Most rows that are kept, whose patches are solved for in the end; every other shot counts by itself.
+    pub kept: usize,
     /// Which patch is next.
     pub choice: Choice,
     /// Residual to reach.
@@ -47,7 +47,7 @@ impl Way {
     #[must_use]
     pub const fn published(shots: u32, residual: f32) -> Self {
         Self {
-            keeps_rows: false,
+            kept: 0,
             choice: Choice::Power,
             residual,
             shots,
@@ -58,7 +58,7 @@ impl Way {
     #[must_use]
     pub const fn kept(shots: u32, residual: f32) -> Self {
         Self {
-            keeps_rows: true,
+            kept: usize::MAX,
             choice: Choice::Relative,
             residual,
             shots,
@@ -162,12 +162,20 @@ impl System {
     /// # Errors
     /// [`RefineError`] when a row is illegal.
     pub fn refine(&self, way: Way) -> Result<Refined, RefineError> {
+        self.refine_then(way, |_| ())
+    }
+
+    /// The same, with something to be done when shooting has ended.
+    ///
+    /// # Errors
+    /// [`RefineError`] when a row is illegal.
+    pub fn refine_then(
+        &self,
+        way: Way,
+        end: impl FnOnce(&mut Refinement<LANES>),
+    ) -> Result<Refined, RefineError> {
         let mesh = self.mesh.view();
-        let rows = if way.keeps_rows {
-            mesh.patches.len()
-        } else {
-            0
-        };
+        let rows = way.kept.min(mesh.patches.len());
         let mut memory = Memory::<LANES>::new(&mesh, self.lights as usize, rows, false);
         let mut refinement = Refinement::new(mesh, self.lights, way.residual, memory.storage())?;
         refinement.set_choice(way.choice);
@@ -180,6 +188,7 @@ impl System {
             shooters.push(patch);
         }
         refinement.finish();
+        end(&mut refinement);
         Ok(Refined {
             irradiance: field(&refinement, &mesh, self.lights),
             ambient: (0..self.lights)

@@ -1,35 +1,37 @@
 //! The atlas: packed contributions of every light to every element, as bytes that live in flash.
 //!
-//! Version 1, little-endian, no alignment needed. Lengths in bytes, `n` elements, `k` lights:
+//! Version 2, little-endian, no alignment needed. Lengths in bytes, `n` elements, `k` lights:
 //!
 //! | at | what |
 //! | --- | --- |
 //! | 0 | `RELUMEAT` |
-//! | 8 | `u16` version, 1 |
-//! | 10 | `u8` code: 0 `exp8`, 1 `exp8s` |
-//! | 11 | `u8` channels of a code: 1 luminance, 3 red, green, blue |
-//! | 12 | `u8` quantity: 0 irradiance, 1 radiosity (reflectance multiplied in) |
-//! | 13 | three zero bytes |
+//! | 8 | `u16` version, 2 |
+//! | 10 | `u8` quantity: 0 irradiance, 1 radiosity (reflectance multiplied in), 2 radiance |
+//! | 11 | three zero bytes |
+//! | 14 | `u16` width of the image whose pixels, row by row, are the elements; 0 for an atlas of no image |
 //! | 16 | `u32` length of the whole atlas |
 //! | 20 | `u32` CRC-32 (ISO-HDLC) of all bytes but these four |
 //! | 24 | `u32` elements `n` |
 //! | 28 | `u32` lights `k` |
 //! | 32 | `u32` length of the names |
-//! | 36 | `u32` surfaces, 0 without a mesh |
-//! | 40 | `u32` faces, 0 without a mesh |
-//! | 44 | `f32` largest error of packing, see [`WorstError::packed`]; all ones: not measured |
-//! | 48 | `f32` the same of what is shown, see [`WorstError::shown`] |
-//! | 52 | `k` lights of 24: nominal emission `3 f32`, scale mantissa `u16`, scale exponent `i16`, length of the name `u16`, two zero bytes, largest error with this light alone `f32` (all ones: not measured) |
+//! | 36 | `u32` length of the tiles, 0 without a light in tiles |
+//! | 40 | `u32` surfaces, 0 without a mesh |
+//! | 44 | `u32` faces, 0 without a mesh |
+//! | 48 | `f32` largest error of packing, see [`WorstError::packed`]; all ones: not measured |
+//! | 52 | `f32` the same of what is shown, see [`WorstError::shown`] |
+//! | 56 | `k` lights of 64: nominal emission `3 f32`, code `u8` (its place in [`Code::ALL`]), a zero byte, length of the name `u16`, largest error with this light alone `f32` (all ones: not measured), two zero bytes, for red, green and blue a [`Curve`] of 14: mantissa `u16` and exponent `i16` of its scale or white, first `u32`, step `u32`, last code `u16` (what a curve does not have is 0; the scale of a logarithmic one is 1) |
 //! | | the names one after the other, UTF-8 |
-//! | | codes: `n` elements of `k` lights of 1 or 3 bytes |
+//! | | codes: for every element, for every light that is not in tiles, 3 bytes of red, green and blue, or 1 of luminance |
+//! | | the tiles, see [`Tiles`] |
 //! | | with a mesh, surfaces of 52: four vertices `3 f32` (a triangle repeats its third), vertex count `u32` |
 //! | | faces of 24: surface `u32`, side `u32` (0 front, 1 back), light `u32` (all ones: none), share `3 f32` (without a light: 0) |
 //! | | elements of 32: face `u32`, parameter corners `from`, `to` `4 f32`, reflectance `3 f32` |
 //!
-//! A code is the exponential code ([`crate::code`]) of the contribution over the light's scale.
-//! The reader borrows the bytes and checks everything once, so that later access cannot fail.
+//! The reader borrows the bytes and checks everything once, so that later access cannot fail. The bits inside
+//! tiles are the exception: whatever they are, they decode to codes that the curves have.
 
 mod read;
+mod tiles;
 mod write;
 
 use core::fmt;
@@ -38,9 +40,13 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 use glam::Vec2;
 
 pub use read::{Atlas, AtlasMesh};
+pub use tiles::{
+    Block, ESCAPE, FIRST_BITS, FULL_BITS, LARGEST_SIDE, PREDICTED, Place, TileBits, Tiles, places,
+    predict,
+};
 pub use write::{Contents, LightEntry, size, write};
 
-use crate::code::Scale;
+use crate::code::{Code, Curve};
 use crate::color::Rgb;
 use crate::geometry::Polygon;
 use crate::mesh::Side;
@@ -48,10 +54,17 @@ use crate::scene::Emission;
 
 /// How an atlas starts.
 pub const MAGIC: [u8; 8] = *b"RELUMEAT";
-const VERSION: u16 = 1;
-const HEADER_BYTES: usize = 52;
+const VERSION: u16 = 2;
+const HEADER_BYTES: usize = 56;
 const CHECKSUM_AT: usize = 20;
-const LIGHT_BYTES: usize = 24;
+const LIGHT_BYTES: usize = 64;
+/// Where the code of a light stands in its record.
+const CODE_AT: usize = 12;
+/// Where the curves of a light stand in its record, and how long one is.
+const CURVES_AT: usize = 22;
+const CURVE_BYTES: usize = 14;
+/// The largest code in tiles: differences of two fit 16 bits.
+pub const LARGEST_TILE_CODE: u16 = i16::MAX as u16;
 const SURFACE_BYTES: usize = 52;
 const FACE_BYTES: usize = 24;
 const ELEMENT_BYTES: usize = 32;
@@ -60,26 +73,6 @@ const NO_LIGHT: u32 = u32::MAX;
 /// Bits of an error that nobody measured; a NaN, so no error has them.
 const NOT_MEASURED: u32 = u32::MAX;
 
-/// What one code stands for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Channels {
-    /// The luminance of a contribution.
-    Luminance,
-    /// Red, green and blue, a code each.
-    Rgb,
-}
-
-impl Channels {
-    /// Codes per element and light.
-    #[must_use]
-    pub const fn count(self) -> usize {
-        match self {
-            Self::Luminance => 1,
-            Self::Rgb => 3,
-        }
-    }
-}
-
 /// What the contributions measure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
@@ -87,6 +80,8 @@ pub enum Quantity {
     Irradiance,
     /// Radiosity without emission, W/m2: the reflectance is multiplied in.
     Radiosity,
+    /// Radiance towards a camera, in the unit of the picture that it came from: the elements are pixels.
+    Radiance,
 }
 
 /// The largest errors of packing over all states of the lights that were tried.
@@ -101,15 +96,19 @@ pub struct WorstError {
     pub shown: f32,
 }
 
-/// Name, nominal emission, scale and error of a light, as read.
+/// Name, nominal emission, code and error of a light, as read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AtlasLight<'a> {
     /// Its name.
     pub name: &'a str,
     /// Nominal mix weight.
     pub emission: Rgb,
-    /// What one unit of the code is worth, at unit emission.
-    pub scale: Scale,
+    /// What its contributions are written in.
+    pub code: Code,
+    /// What the codes of red, green and blue stand for, at unit emission; three times the same for luminance.
+    pub curves: [Curve; 3],
+    /// The largest code of each channel.
+    pub last: [u16; 3],
     /// Largest error with this light alone, in display codes as in [`WorstError::packed`]; `None`
     /// when nobody measured it.
     pub error: Option<f32>,
@@ -220,37 +219,39 @@ fn checksum(bytes: &[u8]) -> Option<u32> {
 struct Layout {
     names: u64,
     codes: u64,
+    tiles: u64,
     surfaces: u64,
     faces: u64,
     elements: u64,
     end: u64,
 }
 
-/// The counts of a header, from which every length follows.
+/// The counts of a header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct CountsOf {
-    channels: Channels,
     elements: u32,
     lights: u32,
     names: u32,
+    tiles: u32,
     surfaces: u32,
     faces: u32,
 }
 
 impl CountsOf {
-    /// Offsets in `u64`; `None` when even those overflow.
-    fn layout(&self) -> Option<Layout> {
+    /// Offsets in `u64`, with so many bytes of codes per element; `None` when even those overflow.
+    fn layout(&self, stride: u64) -> Option<Layout> {
         let [n, k] = [u64::from(self.elements), u64::from(self.lights)];
         let names = HEADER_BYTES as u64 + k * LIGHT_BYTES as u64;
         let codes = names + u64::from(self.names);
-        let per_element = k * self.channels.count() as u64;
-        let surfaces = codes.checked_add(n.checked_mul(per_element)?)?;
+        let tiles = codes.checked_add(n.checked_mul(stride)?)?;
+        let surfaces = tiles.checked_add(self.tiles.into())?;
         let faces = surfaces.checked_add(u64::from(self.surfaces) * SURFACE_BYTES as u64)?;
         let elements = faces.checked_add(u64::from(self.faces) * FACE_BYTES as u64)?;
         let stored = if self.faces > 0 { n } else { 0 };
         Some(Layout {
             names,
             codes,
+            tiles,
             surfaces,
             faces,
             elements,

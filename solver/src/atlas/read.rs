@@ -2,12 +2,13 @@
 
 use glam::{Vec2, Vec3};
 
+use super::tiles::{Block, LARGEST_SIDE, Tiles};
 use super::{
-    AtlasElement, AtlasError, AtlasFace, AtlasLight, CHECKSUM_AT, Channels, CountsOf,
-    ELEMENT_BYTES, FACE_BYTES, HEADER_BYTES, LIGHT_BYTES, MAGIC, NO_LIGHT, NOT_MEASURED, Quantity,
-    SURFACE_BYTES, VERSION, WorstError, checksum,
+    AtlasElement, AtlasError, AtlasFace, AtlasLight, CHECKSUM_AT, CODE_AT, CURVE_BYTES, CURVES_AT,
+    CountsOf, ELEMENT_BYTES, FACE_BYTES, HEADER_BYTES, LARGEST_TILE_CODE, LIGHT_BYTES, MAGIC,
+    NO_LIGHT, NOT_MEASURED, Quantity, SURFACE_BYTES, VERSION, WorstError, checksum,
 };
-use crate::code::{Code, Scale};
+use crate::code::{Code, Curve, Scale};
 use crate::color::{Reflectance, Rgb};
 use crate::geometry::Polygon;
 use crate::mesh::Side;
@@ -16,13 +17,16 @@ use crate::scene::Emission;
 /// A checked atlas that borrows its bytes.
 #[derive(Clone, Copy, Debug)]
 pub struct Atlas<'a> {
-    code: Code,
     quantity: Quantity,
+    image_width: u16,
     counts: CountsOf,
     worst_error: Option<WorstError>,
     lights: &'a [u8],
     names: &'a str,
+    /// Bytes of codes per element.
+    stride: usize,
     codes: &'a [u8],
+    tiles: Option<Tiles<'a>>,
     mesh: Option<AtlasMesh<'a>>,
 }
 
@@ -34,7 +38,24 @@ impl<'a> Atlas<'a> {
     pub fn parse(bytes: &'a [u8]) -> Result<Self, AtlasError> {
         let header = Header::parse(bytes)?;
         let counts = header.counts;
-        let needed = counts.layout().ok_or(AtlasError::Illegal("size"))?;
+        // Else any number of elements would fit into a file of no size.
+        if counts.lights == 0 {
+            return Err(AtlasError::Illegal("number of lights"));
+        }
+        let lights = u64::from(counts.lights) * LIGHT_BYTES as u64 + HEADER_BYTES as u64;
+        if (bytes.len() as u64) < lights {
+            return Err(AtlasError::Truncated { needed: lights });
+        }
+        let lights = bytes.get(HEADER_BYTES..lights as usize).unwrap_or_default();
+        let (mut stride, mut is_tiled) = (0, false);
+        for tag in 0..counts.lights {
+            let code = code_at(lights, tag).ok_or(AtlasError::Illegal("code"))?;
+            stride += code.bytes();
+            is_tiled |= code.is_tiled();
+        }
+        let needed = counts
+            .layout(stride as u64)
+            .ok_or(AtlasError::Illegal("size"))?;
         if needed.end != u64::from(header.length) {
             return Err(AtlasError::Illegal("length"));
         }
@@ -50,14 +71,27 @@ impl<'a> Atlas<'a> {
 
         let part = |from: u64, to: u64| bytes.get(from as usize..to as usize).unwrap_or_default();
         let names = core::str::from_utf8(part(needed.names, needed.codes));
+        let tiles = part(needed.tiles, needed.surfaces);
+        let is_image = header.image_width > 0;
+        if is_image
+            && (counts.faces > 0 || !counts.elements.is_multiple_of(header.image_width.into()))
+        {
+            return Err(AtlasError::Illegal("image width"));
+        }
+        if tiles.is_empty() == is_tiled {
+            return Err(AtlasError::Illegal("table of tiles"));
+        }
+        let tiles = is_tiled.then(|| Tiles::parse(tiles, counts.elements));
         let atlas = Self {
-            code: header.code,
             quantity: header.quantity,
+            image_width: header.image_width,
             counts,
             worst_error: header.worst_error,
-            lights: part(HEADER_BYTES as u64, needed.names),
+            lights,
             names: names.map_err(|_| AtlasError::Illegal("light name"))?,
-            codes: part(needed.codes, needed.surfaces),
+            stride,
+            codes: part(needed.codes, needed.tiles),
+            tiles: tiles.transpose()?,
             mesh: (counts.faces > 0).then(|| AtlasMesh {
                 surfaces: part(needed.surfaces, needed.faces),
                 faces: part(needed.faces, needed.elements),
@@ -92,22 +126,17 @@ impl<'a> Atlas<'a> {
         }
     }
 
-    /// The code.
-    #[must_use]
-    pub const fn code(&self) -> Code {
-        self.code
-    }
-
-    /// One code per contribution or three.
-    #[must_use]
-    pub const fn channels(&self) -> Channels {
-        self.counts.channels
-    }
-
     /// What the contributions measure.
     #[must_use]
     pub const fn quantity(&self) -> Quantity {
         self.quantity
+    }
+
+    /// Width and height of the image whose pixels, row by row from the top, are the elements.
+    #[must_use]
+    pub fn image_size(&self) -> Option<[u32; 2]> {
+        let width = u32::from(self.image_width);
+        Some([width, self.counts.elements.checked_div(width)?])
     }
 
     /// What packing cost, over all states that were tried; `None` when nobody measured it.
@@ -138,23 +167,114 @@ impl<'a> Atlas<'a> {
             Some(AtlasLight {
                 name,
                 emission: record.emission,
-                scale: record.scale,
+                code: record.code,
+                curves: record.curves,
+                last: record.last,
                 error: record.error,
             })
         })
     }
 
-    /// The codes of one element, light by light; empty for a number out of range.
+    /// One more than the largest code of any light.
     #[must_use]
-    pub fn codes(&self, element: u32) -> &'a [u8] {
-        let length = self.counts.lights as usize * self.counts.channels.count();
-        record(self.codes, element, length)
+    pub fn levels(&self) -> usize {
+        let last = self.lights().flat_map(|light| light.last);
+        usize::from(last.max().unwrap_or(0)) + 1
     }
 
-    /// The codes of all elements, one after the other.
+    /// The codes of all elements for the lights that are not in tiles, element by element.
     #[must_use]
-    pub const fn all_codes(&self) -> &'a [u8] {
+    pub const fn codes(&self) -> &'a [u8] {
         self.codes
+    }
+
+    /// Bytes of all codes, those in tiles included.
+    #[must_use]
+    pub const fn code_bytes(&self) -> usize {
+        self.codes.len() + self.counts.tiles as usize
+    }
+
+    /// The tiles, when a light is in tiles.
+    #[must_use]
+    pub const fn tiles(&self) -> Option<Tiles<'a>> {
+        self.tiles
+    }
+
+    /// Calls `f(element, light, codes)` for every contribution, except that a light in tiles is left out where all its codes
+    /// are 0. Codes stand for red, green and blue, and are at most the light's last ones.
+    ///
+    /// Every element meets its lights in the order of their tags, those in tiles last.
+    pub fn for_each(&self, mut f: impl FnMut(u32, u32, [u16; 3])) {
+        if self.stride > 0 {
+            let rows = self.codes.chunks_exact(self.stride).zip(0..);
+            rows.for_each(|(row, element)| {
+                self.for_each_in_row(row, |l, codes| f(element, l, codes))
+            });
+        }
+        self.for_each_in_tiles(self.counts.lights, f);
+    }
+
+    /// The same for one light, `f(element, codes)`.
+    ///
+    /// In tiles, the bits of the lights before it are read, too.
+    pub fn for_each_of(&self, light: u32, mut f: impl FnMut(u32, [u16; 3])) {
+        let Some(code) = code_at(self.lights, light) else {
+            return;
+        };
+        if code.is_tiled() {
+            let lights = light + 1;
+            return self.for_each_in_tiles(lights, |element, l, codes| {
+                if l == light {
+                    f(element, codes);
+                }
+            });
+        }
+        let before = (0..light).filter_map(|tag| code_at(self.lights, tag));
+        let start = before.map(Code::bytes).sum();
+        let rows = self.codes.chunks_exact(self.stride.max(1)).zip(0..);
+        for (row, element) in rows {
+            let own = row.get(start..).unwrap_or_default();
+            if let Some((codes, _)) = split_codes(code, own) {
+                f(element, codes);
+            }
+        }
+    }
+
+    /// The lights of an element that are not in tiles.
+    fn for_each_in_row(&self, row: &[u8], mut f: impl FnMut(u32, [u16; 3])) {
+        if self.stride == 3 * self.counts.lights as usize {
+            let triples = row.as_chunks::<3>().0.iter().zip(0..);
+            return triples.for_each(|(rgb, light)| f(light, rgb.map(u16::from)));
+        }
+        let mut row = row;
+        for (record, light) in self.records().zip(0..) {
+            let code = code_of(record).filter(|code| !code.is_tiled());
+            if let Some((codes, rest)) = code.and_then(|code| split_codes(code, row)) {
+                f(light, codes);
+                row = rest;
+            }
+        }
+    }
+
+    /// The first so many lights, those in tiles.
+    fn for_each_in_tiles(&self, lights: u32, mut f: impl FnMut(u32, u32, [u16; 3])) {
+        let Some(tiles) = self.tiles else {
+            return;
+        };
+        let mut block: Block = [[0; 3]; LARGEST_SIDE * LARGEST_SIDE];
+        for (place, mut bits) in tiles.iter() {
+            for (record, light) in self.records().zip(0..lights) {
+                let is_tiled = code_of(record).is_some_and(Code::is_tiled);
+                if is_tiled && bits.next_light(place, last_codes(record), &mut block) {
+                    let elements = place.elements().zip(&block);
+                    elements.for_each(|(element, codes)| f(element, light, *codes));
+                }
+            }
+        }
+    }
+
+    fn records(&self) -> impl Iterator<Item = &'a [u8; LIGHT_BYTES]> + use<'a> {
+        self.lights.as_chunks::<LIGHT_BYTES>().0.iter()
     }
 
     /// The mesh, when the atlas carries one.
@@ -272,8 +392,8 @@ impl AtlasMesh<'_> {
 }
 
 struct Header {
-    code: Code,
     quantity: Quantity,
+    image_width: u16,
     length: u32,
     checksum: u32,
     counts: CountsOf,
@@ -293,34 +413,31 @@ impl Header {
         if version != VERSION {
             return Err(AtlasError::Version(version));
         }
-        let [code, channels, quantity, reserved @ ..] = input.take::<6>().ok_or(short)?;
+        let [quantity, reserved @ ..] = input.take::<4>().ok_or(short)?;
         if reserved != [0; 3] {
             return Err(AtlasError::Illegal("reserved byte"));
         }
-        let code = Code::ALL.get(usize::from(code));
+        let image_width = input.u16().ok_or(short)?;
         debug_assert_eq!(CHECKSUM_AT, 20);
         let words = input.take::<{ HEADER_BYTES - 16 }>().ok_or(short)?;
         let (words, _) = words.as_chunks::<4>();
         let mut words = words.iter().map(|word| u32::from_le_bytes(*word));
         let mut next = || words.next().ok_or(short);
         Ok(Self {
-            code: *code.ok_or(AtlasError::Illegal("code"))?,
             quantity: match quantity {
                 0 => Quantity::Irradiance,
                 1 => Quantity::Radiosity,
+                2 => Quantity::Radiance,
                 _ => return Err(AtlasError::Illegal("quantity")),
             },
+            image_width,
             length: next()?,
             checksum: next()?,
             counts: CountsOf {
-                channels: match channels {
-                    1 => Channels::Luminance,
-                    3 => Channels::Rgb,
-                    _ => return Err(AtlasError::Illegal("number of channels")),
-                },
                 elements: next()?,
                 lights: next()?,
                 names: next()?,
+                tiles: next()?,
                 surfaces: next()?,
                 faces: next()?,
             },
@@ -345,25 +462,92 @@ fn error(bits: u32) -> Option<Option<f32>> {
 
 struct LightRecord {
     emission: Rgb,
-    scale: Scale,
+    code: Code,
     name_length: u16,
     error: Option<f32>,
+    curves: [Curve; 3],
+    last: [u16; 3],
 }
 
 impl LightRecord {
     fn parse(bytes: &[u8]) -> Option<Self> {
         let mut input = Input(bytes);
         let emission = input.rgb().filter(|emission| emission.is_legal())?;
-        let scale = Scale::from_parts(input.u16()?, i16::from_le_bytes(input.take()?))?;
+        let [code, 0] = input.take()? else {
+            return None;
+        };
+        let code = *Code::ALL.get(usize::from(code))?;
         let name_length = input.u16()?;
+        let error = error(input.u32()?)?;
         input.u16().filter(|reserved| *reserved == 0)?;
+        let ((r, last_r), (g, last_g), (b, last_b)) = (
+            curve(code, &mut input)?,
+            curve(code, &mut input)?,
+            curve(code, &mut input)?,
+        );
         Some(Self {
             emission,
-            scale,
+            code,
             name_length,
-            error: error(input.u32()?)?,
+            error,
+            curves: [r, g, b],
+            last: [last_r, last_g, last_b],
         })
     }
+}
+
+/// A curve and its last code.
+fn curve(code: Code, input: &mut Input) -> Option<(Curve, u16)> {
+    let scale = Scale::from_parts(input.u16()?, i16::from_le_bytes(input.take()?))?;
+    let (first, step, last) = (input.u32()?, input.u32()?, input.u16()?);
+    let curve = match code {
+        Code::Exp8 | Code::Exp8s | Code::Lum8 if first == 0 && step == 0 => {
+            Curve::Exponential { scale }
+        }
+        Code::Display8 | Code::Tiles if step > 0 => Curve::Display {
+            white: scale,
+            first,
+            step,
+        },
+        Code::TilesLog if scale == Scale::ONE && step == 0 => Curve::Logarithmic { first },
+        _ => return None,
+    };
+    let is_legal = if code.is_tiled() {
+        last <= LARGEST_TILE_CODE
+    } else {
+        last == u16::from(u8::MAX)
+    };
+    (is_legal && curve.decode(last).is_finite()).then_some((curve, last))
+}
+
+/// The code of light `tag` of a table of lights; `None` when there is no such code.
+fn code_at(lights: &[u8], tag: u32) -> Option<Code> {
+    code_of(record(lights, tag, LIGHT_BYTES).first_chunk()?)
+}
+
+/// The codes of a contribution at the beginning of some bytes, and the bytes after it.
+fn split_codes(code: Code, bytes: &[u8]) -> Option<([u16; 3], &[u8])> {
+    let (own, rest) = bytes.split_at_checked(code.bytes())?;
+    match *own {
+        [r, g, b] => Some(([r, g, b].map(u16::from), rest)),
+        [luminance] => Some(([luminance.into(); 3], rest)),
+        _ => None,
+    }
+}
+
+fn code_of(record: &[u8; LIGHT_BYTES]) -> Option<Code> {
+    Code::ALL.get(usize::from(*record.get(CODE_AT)?)).copied()
+}
+
+/// The last codes of a light, without looking at the rest.
+fn last_codes(record: &[u8; LIGHT_BYTES]) -> [u16; 3] {
+    let curves = record.get(CURVES_AT..).unwrap_or_default();
+    let mut last = [0; 3];
+    for (last, curve) in last.iter_mut().zip(curves.as_chunks::<CURVE_BYTES>().0) {
+        let [.., low, high] = *curve;
+        *last = u16::from_le_bytes([low, high]);
+    }
+    last
 }
 
 /// Record `index` of a table of records of `length` bytes; empty when out of range.

@@ -1,7 +1,7 @@
 extern crate std;
 
 use super::*;
-use crate::code::{Code, decode, error_bound};
+use crate::code::{Code, Curve, Scale};
 use crate::mesh::{MeshStorage, Spacing, subdivide};
 use crate::scene::{Scene, Surface};
 use glam::Vec3;
@@ -36,6 +36,61 @@ fn surfaces() -> [Surface; 2] {
     [wall.two_sided(), lamp.emitting(1, emission).unwrap()]
 }
 
+/// One light of each kind.
+fn lights() -> [LightEntry<'static>; 4] {
+    let emission = Rgb::new(1.0, 2.0, 3.0);
+    let scale = |largest| Scale::fitting(largest).unwrap();
+    let white = Scale::ONE;
+    let between = |last| Curve::display_between(white, 0.25, 2.0, last).unwrap();
+    let own = |name, code, curves, last| LightEntry {
+        name,
+        emission,
+        code,
+        curves,
+        last: [last; 3],
+    };
+    [
+        LightEntry::exponential("ceiling", emission, Code::Exp8s, scale(1.0)),
+        own("Lämpchen", Code::Display8, [between(255); 3], 255),
+        LightEntry::exponential("grey", emission, Code::Lum8, scale(3.0)),
+        own(
+            "in tiles",
+            Code::Tiles,
+            [Curve::display(white, 1.5).unwrap(); 3],
+            200,
+        ),
+    ]
+}
+
+/// One row of eight elements, all of code 5: a light that is not dark, and for each of the three coded planes
+/// a parameter of 15 and a first value.
+const TILES: [u8; 24] = [
+    3,
+    4,
+    0,
+    0,
+    1,
+    0,
+    0,
+    0,
+    1,
+    0,
+    0,
+    0,
+    8,
+    0,
+    1,
+    0,
+    0,
+    0,
+    0,
+    0,
+    0b1111_1010,
+    0b1111_1000,
+    0b0111_1000,
+    0,
+];
+
 fn sample() -> Vec<u8> {
     let surfaces = surfaces();
     let scene = Scene::new(&surfaces, &[], 2).unwrap();
@@ -46,18 +101,14 @@ fn sample() -> Vec<u8> {
     };
     subdivide(&scene, spacing, |_, _| true, &mut storage).unwrap();
     let mesh = storage.mesh();
-    let entry = |name, largest| LightEntry {
-        name,
-        emission: Rgb::new(1.0, 2.0, 3.0),
-        scale: Scale::fitting(largest).unwrap(),
-    };
+    let lights = lights();
     let contents = Contents {
-        code: Code::Exp8s,
-        channels: Channels::Rgb,
         quantity: Quantity::Irradiance,
-        lights: &[entry("ceiling", 1.0), entry("Lämpchen", 2.0)],
+        lights: &lights,
         elements: 8,
-        errors: Some((WORST, &[0.5, 2.5])),
+        image_width: 0,
+        errors: Some((WORST, &[0.5, 2.5, 1.0, 3.5])),
+        tiles: &TILES,
         mesh: Some((&surfaces.map(|s| *s.polygon()), mesh)),
     };
     let mut bytes = vec![0; size(&contents).unwrap()];
@@ -77,27 +128,43 @@ fn what_was_written_is_read() {
     let bytes = sample();
     let atlas = Atlas::parse(&bytes).unwrap();
     let names: Vec<&str> = atlas.lights().map(|light| light.name).collect();
-    assert_eq!(names, ["ceiling", "Lämpchen"]);
-    assert_eq!((atlas.element_count(), atlas.light_count()), (8, 2));
+    assert_eq!(names, ["ceiling", "Lämpchen", "grey", "in tiles"]);
+    assert_eq!((atlas.element_count(), atlas.light_count()), (8, 4));
     let errors: Vec<_> = atlas.lights().map(|light| light.error).collect();
-    assert_eq!(errors, [Some(0.5), Some(2.5)]);
+    assert_eq!(errors, [Some(0.5), Some(2.5), Some(1.0), Some(3.5)]);
     assert_eq!(atlas.worst_error(), Some(WORST));
 
-    for element in 0..8 {
-        let (triples, rest) = atlas.codes(element).as_chunks::<3>();
-        assert!(rest.is_empty());
-        for ((codes, light), tag) in triples.iter().zip(atlas.lights()).zip(0..) {
-            let scale = light.scale.value();
-            for (code, exact) in codes.iter().zip(value(element, tag).to_array()) {
-                let found = decode(*code) * scale;
-                let bound = error_bound(*code) * scale * 1.0001;
-                assert!(
-                    (found - exact).abs() <= bound,
-                    "{element} {tag}: {found} {exact}"
-                );
-            }
+    let mut seen = Vec::new();
+    atlas.for_each(|element, tag, codes| {
+        seen.push((element, tag, codes));
+        let light = atlas.lights().nth(tag as usize).unwrap();
+        if tag == 3 {
+            assert_eq!(codes, [5; 3]);
+            return;
         }
+        let exact = value(element, tag);
+        let exact = match light.code {
+            Code::Lum8 => [exact.luminance(); 3],
+            _ => exact.to_array(),
+        };
+        for ((code, curve), exact) in codes.into_iter().zip(light.curves).zip(exact) {
+            let bound = curve.error_bound(code, 255) * 1.0001;
+            let error =
+                (curve.decode(code) - exact.clamp(0.25 * f32::from(u8::from(tag == 1)), 2.5)).abs();
+            assert!(
+                error <= bound,
+                "{element} {tag}: {code} {exact} {error} {bound}"
+            );
+        }
+    });
+    assert_eq!(seen.len(), 8 * 4);
+    for tag in 0..4 {
+        let mut own = Vec::new();
+        atlas.for_each_of(tag, |element, codes| own.push((element, tag, codes)));
+        let expected: Vec<_> = seen.iter().copied().filter(|(_, t, _)| *t == tag).collect();
+        assert_eq!(own, expected);
     }
+    atlas.for_each_of(4, |_, _| panic!("there is no such light"));
 
     let mesh = atlas.mesh().unwrap();
     assert_eq!((mesh.surface_count(), mesh.face_count()), (2, 3));
@@ -152,37 +219,58 @@ fn resign(bytes: &mut [u8]) {
 #[test]
 fn what_the_format_does_not_allow_is_an_error() {
     let sound = sample();
-    let names = "ceilingLämpchen".len();
-    let surfaces = 52 + 2 * 24 + names + 8 * 2 * 3;
+    let names = "ceilingLämpchengreyin tiles".len();
+    let lights = |tag: usize| 56 + tag * 64;
+    let tiles = lights(4) + names + 8 * (3 + 3 + 1);
+    let surfaces = tiles + TILES.len();
     let faces = surfaces + 2 * 52;
     let elements = faces + 3 * 24;
     assert_eq!(sound.len(), elements + 8 * 32);
     let nan = f32::NAN.to_le_bytes();
     let minus = (-1.0_f32).to_le_bytes();
     for (at, bytes, what) in [
-        (10, &[9][..], "code"),
-        (11, &[2], "number of channels"),
-        (12, &[2], "quantity"),
+        (10, &[3][..], "quantity"),
+        (11, &[1], "reserved byte"),
         (13, &[1], "reserved byte"),
-        (15, &[1], "reserved byte"),
+        (14, &[4], "image width"),
         (16, &[0], "length"),
-        (44, &nan, "error"),
-        (44, &minus, "error"),
-        (48, &[0xff; 4], "error"),
-        (44, &[0xff; 8], "error of a light"),
-        (52, &minus, "light"),
-        (52 + 16, &[0], "light name"),
-        (52 + 18, &[1], "light"),
-        (52 + 19, &[1], "light"),
-        (52 + 20, &nan, "light"),
-        (52 + 20, &[0xff; 4], "error of a light"),
-        (52 + 2 * 24, &[0xff], "light name"),
+        (28, &[0; 4], "number of lights"),
+        (48, &nan, "error"),
+        (48, &minus, "error"),
+        (52, &[0xff; 4], "error"),
+        (48, &[0xff; 8], "error of a light"),
+        (lights(0), &minus, "light"),
+        (lights(0) + 12, &[9], "code"),
+        (lights(0) + 12, &[2], "light"),
+        (lights(0) + 13, &[1], "light"),
+        (lights(0) + 14, &[0], "light name"),
+        (lights(0) + 16, &nan, "light"),
+        (lights(0) + 16, &[0xff; 4], "error of a light"),
+        (lights(0) + 20, &[1], "light"),
+        (lights(0) + 22, &[0, 1], "light"),
+        (lights(0) + 26, &[1], "light"),
+        (lights(0) + 34, &[254], "light"),
+        (lights(1) + 30, &[0; 4], "light"),
+        (lights(3) + 35, &[0x80], "light"),
+        (lights(3) + 30, &[0xff; 4], "light"),
+        (lights(4), &[0xff], "light name"),
+        (tiles, &[0], "table of tiles"),
+        (tiles, &[17], "table of tiles"),
+        (tiles + 1, &[0], "table of tiles"),
+        (tiles + 1, &[17], "table of tiles"),
+        (tiles + 2, &[1], "table of tiles"),
+        (tiles + 4, &[2], "table of tiles"),
+        (tiles + 7, &[0xff], "table of tiles"),
+        (tiles + 8, &[2], "table of tiles"),
+        (tiles + 12, &[7], "table of tiles"),
+        (tiles + 14, &[0], "table of tiles"),
+        (tiles + 16, &[5], "table of tiles"),
         (surfaces, &nan, "surface"),
         (surfaces + 48, &[5], "surface"),
         (faces, &[2], "face"),
         (faces + 4, &[2], "face"),
         (faces + 12, &1_f32.to_le_bytes(), "face"),
-        (faces + 2 * 24 + 8, &[2], "light of a face"),
+        (faces + 2 * 24 + 8, &[4], "light of a face"),
         (elements, &[1], "face of an element"),
         (elements + 7 * 32, &[3], "face of an element"),
         (elements + 4, &minus, "element"),
@@ -202,7 +290,7 @@ fn what_the_format_does_not_allow_is_an_error() {
 
 proptest! {
     #[test]
-    fn forged_atlases_never_panic(at in 0_usize..600, value: u8, also in 8_usize..52, byte: u8) {
+    fn forged_atlases_never_panic(at in 0_usize..600, value: u8, also in 8_usize..360, byte: u8) {
         let mut bytes = sample();
         let at = at % bytes.len();
         bytes[at] = value;
@@ -210,7 +298,13 @@ proptest! {
         resign(&mut bytes);
         if let Ok(atlas) = Atlas::parse(&bytes) {
             prop_assert_eq!(atlas.lights().count(), atlas.light_count() as usize);
-            prop_assert!(atlas.element_count() == 0 || !atlas.codes(0).is_empty() || atlas.light_count() == 0);
+            let last: Vec<[u16; 3]> = atlas.lights().map(|light| light.last).collect();
+            let mut is_legal = true;
+            atlas.for_each(|element, light, codes| {
+                let within = codes.iter().zip(last[light as usize]).all(|(c, last)| *c <= last);
+                is_legal &= within && element < atlas.element_count();
+            });
+            prop_assert!(is_legal);
         }
     }
 
@@ -221,25 +315,41 @@ proptest! {
 }
 
 #[test]
+fn elements_without_a_light_are_no_atlas() {
+    let contents = Contents {
+        quantity: Quantity::Irradiance,
+        lights: &[],
+        elements: u32::MAX,
+        image_width: 0,
+        errors: None,
+        tiles: &[],
+        mesh: None,
+    };
+    let refused = Err(AtlasError::Unfit("elements without a light"));
+    assert_eq!(size(&contents), refused);
+}
+
+#[test]
 fn an_atlas_without_a_mesh_has_none() {
     let contents = Contents {
-        code: Code::Exp8,
-        channels: Channels::Luminance,
         quantity: Quantity::Radiosity,
-        lights: &[LightEntry {
-            name: "",
-            emission: Rgb::WHITE,
-            scale: Scale::ONE,
-        }],
+        lights: &[LightEntry::exponential(
+            "",
+            Rgb::WHITE,
+            Code::Lum8,
+            Scale::ONE,
+        )],
         elements: 3,
+        image_width: 0,
         errors: None,
+        tiles: &[],
         mesh: None,
     };
     let mut bytes = vec![0; size(&contents).unwrap()];
     write(&contents, value, &mut bytes).unwrap();
     let atlas = Atlas::parse(&bytes).unwrap();
     assert!(atlas.mesh().is_none());
-    assert_eq!(atlas.all_codes().len(), 3);
+    assert_eq!(atlas.code_bytes(), 3);
     assert_eq!(atlas.quantity(), Quantity::Radiosity);
     assert_eq!(atlas.worst_error(), None);
     assert_eq!(atlas.lights().next().unwrap().error, None);

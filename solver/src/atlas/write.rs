@@ -1,41 +1,59 @@
 //! Writes an atlas into the caller's slice.
 
 use super::{
-    AtlasError, CHECKSUM_AT, Channels, CountsOf, HEADER_BYTES, MAGIC, NO_LIGHT, NOT_MEASURED,
-    Quantity, VERSION, WorstError, checksum,
+    AtlasError, CHECKSUM_AT, CountsOf, HEADER_BYTES, LARGEST_TILE_CODE, MAGIC, NO_LIGHT,
+    NOT_MEASURED, Quantity, VERSION, WorstError, checksum,
 };
-use crate::code::{Code, Scale, encode};
+use crate::code::{Code, Curve, Scale};
 use crate::color::Rgb;
 use crate::geometry::Polygon;
 use crate::mesh::{Mesh, Side};
 
-/// Name, nominal emission and scale of a light, to be written.
+/// Name, nominal emission and code of a light, to be written.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightEntry<'a> {
     /// Its name, at most 65 535 bytes.
     pub name: &'a str,
     /// Nominal mix weight, finite and not negative.
     pub emission: Rgb,
-    /// What one unit of the code is worth, at unit emission.
-    pub scale: Scale,
+    /// What its contributions are written in.
+    pub code: Code,
+    /// What the codes of red, green and blue stand for; luminance takes the first.
+    pub curves: [Curve; 3],
+    /// The largest code of each channel: 255, or at most [`LARGEST_TILE_CODE`](super::LARGEST_TILE_CODE) in tiles.
+    pub last: [u16; 3],
+}
+
+impl<'a> LightEntry<'a> {
+    /// A light in one of the exponential codes, with one scale for its channels.
+    #[must_use]
+    pub const fn exponential(name: &'a str, emission: Rgb, code: Code, scale: Scale) -> Self {
+        Self {
+            name,
+            emission,
+            code,
+            curves: [Curve::Exponential { scale }; 3],
+            last: [u8::MAX as u16; 3],
+        }
+    }
 }
 
 /// What an atlas is made of, besides the contributions.
 #[derive(Clone, Copy, Debug)]
 pub struct Contents<'a> {
-    /// The code.
-    pub code: Code,
-    /// One code per contribution or three.
-    pub channels: Channels,
     /// What the contributions measure.
     pub quantity: Quantity,
     /// The lights, in the order of their tags.
     pub lights: &'a [LightEntry<'a>],
     /// How many elements there are.
     pub elements: u32,
+    /// Width of the image whose pixels, row by row from the top, are the elements; 0 without one.
+    pub image_width: u16,
     /// What packing cost: the worst, and that of every light alone (see
     /// [`AtlasLight::error`](super::AtlasLight::error)); `None` when nobody measured it.
     pub errors: Option<(WorstError, &'a [f32])>,
+    /// The table of tiles with the codes of all lights in tiles ([`Tiles`](super::Tiles)); empty without such a light.
+    pub tiles: &'a [u8],
     /// Outlines of all surfaces and the mesh, for drawing and probing by place; `None` saves their bytes.
     pub mesh: Option<(&'a [Polygon], Mesh<'a>)>,
 }
@@ -52,6 +70,15 @@ impl Contents<'_> {
         {
             return Err(AtlasError::Unfit("another mesh than that of its elements"));
         }
+        if self.lights.is_empty() {
+            return Err(AtlasError::Unfit("elements without a light"));
+        }
+        let width = u32::from(self.image_width);
+        if width > 0 && (self.mesh.is_some() || !self.elements.is_multiple_of(width)) {
+            return Err(AtlasError::Unfit(
+                "an image with a mesh, or of rows that are not full",
+            ));
+        }
         if self
             .errors
             .is_some_and(|(_, e)| e.len() != self.lights.len())
@@ -59,10 +86,10 @@ impl Contents<'_> {
             return Err(AtlasError::Unfit("errors of other lights than its own"));
         }
         Ok(CountsOf {
-            channels: self.channels,
             elements: self.elements,
             lights: count(self.lights.len(), "2^32 lights; use fewer")?,
             names: count(names, "names of 4 GiB; shorten them")?,
+            tiles: count(self.tiles.len(), "4 GiB of tiles; use longer elements")?,
             surfaces: count(surfaces, "2^32 surfaces; use fewer")?,
             faces: count(faces, "2^32 faces; use fewer")?,
         })
@@ -74,7 +101,8 @@ impl Contents<'_> {
 /// # Errors
 /// [`AtlasError::Unfit`] for counts that the format cannot hold.
 pub fn size(contents: &Contents) -> Result<usize, AtlasError> {
-    let layout = contents.counts()?.layout();
+    let stride = contents.lights.iter().map(|l| l.code.bytes() as u64);
+    let layout = contents.counts()?.layout(stride.sum());
     layout
         .filter(|layout| layout.end <= u64::from(u32::MAX))
         .and_then(|layout| usize::try_from(layout.end).ok())
@@ -84,7 +112,7 @@ pub fn size(contents: &Contents) -> Result<usize, AtlasError> {
 }
 
 /// Writes an atlas to the start of `out`; `contribution(element, light)` is in W/m2 at unit
-/// emission. Returns its length.
+/// emission, and is asked for the lights that are not in tiles. Returns its length.
 ///
 /// # Errors
 /// [`AtlasError::Full`] when `out` is too short, [`AtlasError::Unfit`] for counts, names, emissions
@@ -99,15 +127,18 @@ pub fn write(
     let mut output = Output { rest: bytes };
     header(contents, needed, &mut output)?;
     lights(contents, &mut output)?;
-    for element in 0..contents.elements {
-        for (light, tag) in contents.lights.iter().zip(0..) {
-            let value = contribution(element, tag) * light.scale.value().recip();
-            match contents.channels {
-                Channels::Luminance => output.put(&[encode(value.luminance())])?,
-                Channels::Rgb => output.put(&value.to_array().map(encode))?,
+    // There may be millions of lights in tiles, which have nothing here.
+    let is_fixed = |light: &LightEntry| !light.code.is_tiled();
+    if contents.lights.iter().any(is_fixed) {
+        for element in 0..contents.elements {
+            for (light, tag) in contents.lights.iter().zip(0..) {
+                if is_fixed(light) {
+                    codes(light, contribution(element, tag), &mut output)?;
+                }
             }
         }
     }
+    output.put(contents.tiles)?;
     if let Some((surfaces, mesh)) = contents.mesh {
         mesh_parts(surfaces, mesh, &mut output)?;
     }
@@ -120,27 +151,35 @@ pub fn write(
     Ok(needed)
 }
 
+/// The codes of one contribution.
+fn codes(light: &LightEntry, value: Rgb, output: &mut Output) -> Result<(), AtlasError> {
+    let encode = |channel: usize, value: f32| {
+        let curve = light.curves.get(channel).zip(light.last.get(channel));
+        // Only tiles have codes beyond a byte, see `put_curve`.
+        curve.map_or(0, |(curve, last)| curve.encode(value, *last) as u8)
+    };
+    if light.code == Code::Lum8 {
+        return output.put(&[encode(0, value.luminance())]);
+    }
+    let [r, g, b] = value.to_array();
+    output.put(&[encode(0, r), encode(1, g), encode(2, b)])
+}
+
 fn header(contents: &Contents, length: usize, output: &mut Output) -> Result<(), AtlasError> {
     let counts = contents.counts()?;
     output.put(&MAGIC)?;
     output.put(&VERSION.to_le_bytes())?;
     output.put(&[
-        match contents.code {
-            Code::Exp8 => 0,
-            Code::Exp8s => 1,
-        },
-        match contents.channels {
-            Channels::Luminance => 1,
-            Channels::Rgb => 3,
-        },
         match contents.quantity {
             Quantity::Irradiance => 0,
             Quantity::Radiosity => 1,
+            Quantity::Radiance => 2,
         },
         0,
         0,
         0,
     ])?;
+    output.put(&contents.image_width.to_le_bytes())?;
     let worst = contents.errors.map(|(worst, _)| worst);
     // `size` has checked that the length fits; the checksum is filled in at the end.
     let rest = [
@@ -149,6 +188,7 @@ fn header(contents: &Contents, length: usize, output: &mut Output) -> Result<(),
         counts.elements,
         counts.lights,
         counts.names,
+        counts.tiles,
         counts.surfaces,
         counts.faces,
         error_bits(worst.map(|worst| worst.packed))?,
@@ -181,15 +221,44 @@ fn lights(contents: &Contents, output: &mut Output) -> Result<(), AtlasError> {
         })?;
         let error = contents.errors.and_then(|(_, errors)| errors.get(tag));
         output.rgb(light.emission)?;
-        output.put(&light.scale.mantissa().to_le_bytes())?;
-        output.put(&light.scale.exponent().to_le_bytes())?;
+        let number = Code::ALL.iter().position(|code| *code == light.code);
+        output.put(&[number.unwrap_or_default() as u8, 0])?;
         output.put(&length.to_le_bytes())?;
-        output.put(&[0, 0])?;
         output.u32(error_bits(error.copied())?)?;
+        output.put(&[0, 0])?;
+        for (curve, last) in light.curves.iter().zip(light.last) {
+            put_curve(light.code, *curve, last, output)?;
+        }
     }
     lights
         .iter()
         .try_for_each(|light| output.put(light.name.as_bytes()))
+}
+
+fn put_curve(code: Code, curve: Curve, last: u16, output: &mut Output) -> Result<(), AtlasError> {
+    let (scale, first, step) = match (code, curve) {
+        (Code::Exp8 | Code::Exp8s | Code::Lum8, Curve::Exponential { scale }) => (scale, 0, 0),
+        (Code::Display8 | Code::Tiles, Curve::Display { white, first, step }) => {
+            (white, first, step)
+        }
+        (Code::TilesLog, Curve::Logarithmic { first }) => (Scale::ONE, first, 0),
+        _ => return Err(AtlasError::Unfit("a code with the curve of another one")),
+    };
+    let is_legal = if code.is_tiled() {
+        last <= LARGEST_TILE_CODE
+    } else {
+        last == u16::from(u8::MAX)
+    };
+    if !is_legal || !curve.decode(last).is_finite() {
+        return Err(AtlasError::Unfit(
+            "a contribution beyond its code; change the emission",
+        ));
+    }
+    output.put(&scale.mantissa().to_le_bytes())?;
+    output.put(&scale.exponent().to_le_bytes())?;
+    output.u32(first)?;
+    output.u32(step)?;
+    output.put(&last.to_le_bytes())
 }
 
 fn mesh_parts(surfaces: &[Polygon], mesh: Mesh, output: &mut Output) -> Result<(), AtlasError> {

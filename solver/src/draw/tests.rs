@@ -1,6 +1,6 @@
 extern crate std;
 use super::*;
-use crate::atlas::{Atlas, Channels, Contents, LightEntry, Quantity, size, write};
+use crate::atlas::{Atlas, Contents, LightEntry, Quantity, size, write};
 use crate::code::{Code, Scale};
 use crate::color::Rgb;
 use crate::mesh::{MeshStorage, Spacing, subdivide};
@@ -41,16 +41,17 @@ fn atlas() -> Vec<u8> {
     };
     subdivide(&scene, spacing, |_, _| true, &mut storage).unwrap();
     let contents = Contents {
-        code: Code::Exp8s,
-        channels: Channels::Rgb,
         quantity: Quantity::Irradiance,
-        lights: &[LightEntry {
-            name: "lamp",
-            emission: Rgb::WHITE,
-            scale: Scale::ONE,
-        }],
+        lights: &[LightEntry::exponential(
+            "lamp",
+            Rgb::WHITE,
+            Code::Exp8s,
+            Scale::ONE,
+        )],
         elements: 2,
+        image_width: 0,
         errors: None,
+        tiles: &[],
         mesh: Some((&surfaces.map(|s| *s.polygon()), storage.mesh())),
     };
     let mut bytes = vec![0; size(&contents).unwrap()];

@@ -13,6 +13,7 @@
 //! `cos a cos b / r^2` at 4 of 16 stratified points of the patch. Factors are finite and in [0, 1];
 //! a coplanar or back-facing pair gives 0.
 
+mod estimate;
 mod lambert;
 mod visible;
 
@@ -23,6 +24,7 @@ use crate::geometry::{Clipped, Polygon, SamplePoint, from_unit_square, gauss_poi
 use crate::mesh::Mesh;
 use crate::visibility::{Shaft, Visibility};
 
+pub use estimate::estimate;
 pub use lambert::point_to_polygon;
 
 use lambert::{above_horizon, lambert, open_factor};
@@ -249,11 +251,18 @@ pub fn fill(
     visibility: &impl Visibility,
     row: &mut [f32],
 ) {
+    fill_with(mesh, first, row, |receiver| {
+        shooter.form_factor(receiver, visibility)
+    });
+}
+
+/// Fills `row[j]` with what `factor` says of element `first + j`; 0 beyond the mesh.
+fn fill_with(mesh: &Mesh, first: u32, row: &mut [f32], factor: impl Fn(&Polygon) -> f32) {
     let elements = mesh.elements.get(first as usize..).unwrap_or_default();
     row.fill(0.0);
-    for (factor, element) in row.iter_mut().zip(elements) {
+    for (value, element) in row.iter_mut().zip(elements) {
         if let Some(receiver) = mesh.element_polygon(element) {
-            *factor = shooter.form_factor(&receiver, visibility);
+            *value = factor(&receiver);
         }
     }
 }

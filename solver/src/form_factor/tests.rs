@@ -173,3 +173,52 @@ proptest! {
         prop_assert!((small - large).abs() <= 1e-5, "{small} {large}");
     }
 }
+
+#[test]
+fn an_estimate_is_the_factor_where_nothing_stands_between() {
+    let receiver = floor().part(Vec2::ZERO, Vec2::splat(0.25));
+    for height in [1e-3, 0.1, 0.5, 1.0, 3.0, 30.0] {
+        let shooter = Shooter::new(ceiling(height));
+        let exact = shooter.form_factor(&receiver, &Open);
+        let found = shooter.estimate(&receiver, &Open);
+        // Near, it is the same average; far, the middle stands for it, within 1 % (`NEAR`).
+        assert!(
+            (found / exact - 1.0).abs() < 0.01,
+            "{height}: {found} {exact}"
+        );
+    }
+}
+
+#[test]
+fn four_segments_see_half_a_blocker_as_a_half_and_a_whole_one_as_nothing() {
+    let receiver = floor().part(Vec2::ZERO, Vec2::splat(0.25));
+    let shooter = Shooter::new(ceiling(3.0));
+    let open = shooter.estimate(&receiver, &Open);
+    let estimate = |share: f32| {
+        // Just below the shooter, over this share of its width.
+        let plate = [(-1.0, -1.0), (-1.0, 2.0), (share, 2.0), (share, -1.0)];
+        let plate = plate.map(|(x, y)| Vec3::new(x, y, 2.999));
+        let plate = Surface::new(0, &plate, Rgb::BLACK).unwrap();
+        shooter.estimate(&receiver, &Occluders(&[plate])) / open
+    };
+    assert!(estimate(2.0).abs() < 1e-6);
+    // Two of four points of the patch, whose distances to the receiver differ by a few per cent.
+    assert!((estimate(0.5) - 0.5).abs() < 0.05, "{}", estimate(0.5));
+}
+
+proptest! {
+    #[test]
+    fn any_pair_has_an_estimate_between_zero_and_the_open_factor(
+        shooter in parallelogram(),
+        receiver in parallelogram(),
+        blocker in parallelogram(),
+    ) {
+        let shooter = Shooter::new(shooter);
+        let surface = Surface::new(0, blocker.vertices(), Rgb::BLACK).unwrap();
+        let blocked = shooter.estimate(&receiver, &Occluders(&[surface]));
+        prop_assert!((0.0..=1.0).contains(&blocked), "{blocked}");
+        // Both average the same points wherever something may block.
+        let open = shooter.form_factor(&receiver, &Open).max(shooter.estimate(&receiver, &Open));
+        prop_assert!(blocked <= open * 1.000_01 + 1e-6, "{blocked} {open}");
+    }
+}

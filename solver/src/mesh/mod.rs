@@ -19,7 +19,7 @@ use glam::Vec2;
 
 use crate::color::Rgb;
 use crate::geometry::Polygon;
-use crate::scene::Emission;
+use crate::scene::{Emission, Surface};
 
 pub use storage::{MeshError, MeshSink, MeshStorage};
 pub use subdivide::{Counts, Spacing, element_count, is_face, subdivide};
@@ -123,10 +123,37 @@ impl<'a> Mesh<'a> {
         )
     }
 
+    /// True for a patch that has elements, and so reflects; false for a black lamp.
+    #[must_use]
+    pub fn receives(&self, patch: u32) -> bool {
+        let patch = self.patches.get(patch as usize);
+        let face = patch.and_then(|patch| self.faces.get(patch.face as usize));
+        face.is_some_and(|face| face.element_count > 0)
+    }
+
     /// What a patch emits.
     #[must_use]
     pub fn patch_emission(&self, patch: u32) -> Option<Emission> {
         let patch = self.patches.get(patch as usize)?;
         self.faces.get(patch.face as usize)?.emission
+    }
+
+    /// The sides of a scene's surfaces that have no patches here, each with its front outwards: black ones, backs
+    /// of what is seen from one side only, faces that were left out. They fill a part of the view and shoot nothing.
+    pub fn dark_sides(&self, surfaces: &'a [Surface]) -> impl Iterator<Item = Polygon> + use<'a> {
+        let faces = self.faces;
+        let has_patches = move |surface: u32, side: Side| {
+            let order = |face: &Face| (face.surface, face.side == Side::Back);
+            let found = faces.binary_search_by_key(&(surface, side == Side::Back), order);
+            let face = found.ok().and_then(|index| faces.get(index));
+            face.is_some_and(|face| face.element_count > 0 || face.emission.is_some())
+        };
+        surfaces.iter().zip(0..).flat_map(move |(surface, number)| {
+            let front = *surface.polygon();
+            [(Side::Front, front), (Side::Back, front.flipped())]
+                .into_iter()
+                .filter(move |(side, _)| !has_patches(number, *side))
+                .map(|(_, polygon)| polygon)
+        })
     }
 }

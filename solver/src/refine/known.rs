@@ -68,17 +68,17 @@ impl<const K: usize> Refinement<'_, K> {
 
     /// Keeps a row with its reflected shares; false when there is no room.
     pub(super) fn keep(&mut self, patch: u32, row: &[f32]) -> bool {
-        let (n, p) = (self.mesh.elements.len(), self.mesh.patches.len());
+        let n = self.mesh.elements.len();
         let slot = self.rows_kept as usize;
-        let rows = &mut self.storage.rows;
-        let (Some(factors), Some(shares), Some(state)) = (
-            rows.factors.get_mut(slot * n..(slot + 1) * n),
-            rows.shares.get_mut(slot * p..(slot + 1) * p),
+        // What receives nothing never shoots again: where room is scarce, it is for others.
+        let is_waste = self.capacity < self.mesh.patches.len() && !self.mesh.receives(patch);
+        let (Some(factors), Some(state)) = (
+            self.storage.rows.factors.get_mut(slot * n..(slot + 1) * n),
             self.storage.patches.get_mut(patch as usize),
         ) else {
             return false;
         };
-        if slot >= self.capacity || state.row != 0 {
+        if slot >= self.capacity || state.row != 0 || is_waste {
             return false;
         }
         for (kept, factor) in factors.iter_mut().zip(row) {
@@ -86,10 +86,18 @@ impl<const K: usize> Refinement<'_, K> {
         }
         self.rows_kept += 1;
         state.row = self.rows_kept;
-        for (share, state) in shares.iter_mut().zip(self.storage.patches.iter()) {
+        self.keep_shares(slot);
+        true
+    }
+
+    /// Keeps the reflected shares of the row at hand.
+    pub(super) fn keep_shares(&mut self, slot: usize) {
+        let p = self.mesh.patches.len();
+        let shares = self.storage.rows.shares.get_mut(slot * p..(slot + 1) * p);
+        let shares = shares.unwrap_or_default().iter_mut();
+        for (share, state) in shares.zip(self.storage.patches.iter()) {
             *share = state.gathered;
         }
-        true
     }
 
     /// Shrinks the unshot radiosity of the known patches to `tolerance` of itself.
@@ -204,7 +212,7 @@ fn reflect_all<const K: usize>(
 }
 
 /// Number of a patch's row in the storage; `None` when it is not known.
-fn slot(state: &PatchState) -> Option<usize> {
+pub(super) fn slot(state: &PatchState) -> Option<usize> {
     (state.row as usize).checked_sub(1)
 }
 

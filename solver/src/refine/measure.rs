@@ -63,10 +63,14 @@ impl<const K: usize> Refinement<'_, K> {
             area += element.area;
             reflecting += element.reflectance * element.area;
         }
-        if area <= 0.0 || self.area_shot <= 0.0 {
+        if area <= 0.0 {
             return Rgb::BLACK;
         }
-        let landing = (self.area_landed / self.area_shot) as f32;
+        let landing = if self.area_shot > 0.0 {
+            (self.area_landed / self.area_shot) as f32
+        } else {
+            1.0
+        };
         let term = |power: f32, reflecting: f32| {
             power.max(0.0) / area * landing / (1.0 - landing * reflecting / area).max(f32::EPSILON)
         };

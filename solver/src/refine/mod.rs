@@ -8,7 +8,8 @@
 //!
 //! A row that the storage keeps is never asked for again: what its patch has to send later is found by solving the
 //! system of all known patches, and reaches the elements in one pass ([`Refinement::finish`]).
-//! Rows for which there is no room are shot at once and asked for again.
+//! Rows for which there is no room are shot at once and asked for again. Who ends before all rows are known can have the
+//! missing ones estimated ([`Refinement::close`]).
 //!
 //! Next is the patch with the largest `sum_m w_m (dB_im A_i / P_m)^2` (summed over the channels), so that a dim light
 //! converges as well as a bright one, or, as published, the largest `sum_m w_m dB_im A_i`; `w_m`
@@ -16,10 +17,11 @@
 //! (luminaires). Residual of a light: `sum_i dB_im A_i / P_m`; of the solution: the largest.
 //! Ambient term (Cohen et al. 1988, eq. 12), per light, as an irradiance:
 //! `a = g U / (1 - g rho)`, with the unshot power `U` over the whole area, the mean reflectance
-//! `rho`, and `g`, the share of what the rows so far sent out that landed on elements (1 if all did).
+//! `rho`, and `g`, the share of what the rows so far sent out that landed on elements (1 if all did, or none was sent).
 //!
 //! Lights come in blocks of `K` lanes; all blocks share one row.
 
+mod close;
 mod error;
 mod known;
 pub mod krylov;
@@ -167,7 +169,7 @@ impl<'a, const K: usize> Refinement<'a, K> {
             return Err(RefineError::Unknown);
         }
         self.check(row, f32::MAX)?;
-        self.gather(row);
+        reflected_shares(&self.mesh, self.storage.patches, row);
 
         let mut delta = [[0.0; K]; 3];
         let (block, lane) = address::<K>(light);
@@ -217,7 +219,7 @@ impl<'a, const K: usize> Refinement<'a, K> {
         self.check(row, 1.0)?;
         self.rows_evaluated += 1;
         self.note_landing(patch, row);
-        self.gather(row);
+        reflected_shares(&self.mesh, self.storage.patches, row);
         if let Some((block, delta)) = self.take_first_shot(patch) {
             let n = self.mesh.elements.len();
             distribute(part(self.storage.direct, block, n), row, &delta);
@@ -269,22 +271,6 @@ impl<'a, const K: usize> Refinement<'a, K> {
         let mut delta = [[0.0; K]; 3];
         add_to_lane(&mut delta, lane, emission.share);
         Some((block, delta))
-    }
-
-    /// What share of a row each patch reflects, into the patch states.
-    fn gather(&mut self, row: &[f32]) {
-        let patches = &mut *self.storage.patches;
-        patches
-            .iter_mut()
-            .for_each(|state| state.gathered = Rgb::BLACK);
-        for (factor, element) in row.iter().zip(self.mesh.elements) {
-            if let Some(state) = patches.get_mut(element.patch as usize) {
-                state.gathered += element.reflectance * (factor * element.area);
-            }
-        }
-        for (state, patch) in patches.iter_mut().zip(self.mesh.patches) {
-            state.gathered = state.gathered * patch.area.recip();
-        }
     }
 
     /// Adds what the gathered shares of `delta` reflect to the unshot radiosity of a block, and to
@@ -376,6 +362,21 @@ impl<'a, const K: usize> Refinement<'a, K> {
             }
         }
         best.1
+    }
+}
+
+/// What share of a row each patch reflects, into the patch states.
+fn reflected_shares(mesh: &Mesh, patches: &mut [PatchState], row: &[f32]) {
+    for state in &mut *patches {
+        state.gathered = Rgb::BLACK;
+    }
+    for (factor, element) in row.iter().zip(mesh.elements) {
+        if let Some(state) = patches.get_mut(element.patch as usize) {
+            state.gathered += element.reflectance * (factor * element.area);
+        }
+    }
+    for (state, patch) in patches.iter_mut().zip(mesh.patches) {
+        state.gathered = state.gathered * patch.area.recip();
     }
 }
 

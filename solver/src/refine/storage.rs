@@ -9,6 +9,8 @@ use crate::mesh::Mesh;
 pub struct PatchState {
     /// Number of its row in the storage, plus one; 0 when the row is not known.
     pub(super) row: u32,
+    /// True when that row was not evaluated.
+    pub(super) is_estimated: bool,
     /// True once its own emission has been shot.
     pub(super) has_emitted: bool,
     /// Reflected share of the row at hand: `sum_j A_j rho_j F_ji / A_p`.
@@ -19,6 +21,7 @@ impl PatchState {
     /// Nothing known, nothing shot.
     pub const EMPTY: Self = Self {
         row: 0,
+        is_estimated: false,
         has_emitted: false,
         gathered: Rgb::BLACK,
     };
@@ -76,7 +79,7 @@ pub struct Storage<'a, const K: usize> {
 /// Memory for rows that are not to be evaluated twice, and for solving the system of their patches.
 ///
 /// A row takes `4 n + 12 p` bytes. With none of it a refinement shoots again what it has seen
-/// before, as published.
+/// before, as published; where there is not room for all, none is wasted on black lamps, which shoot but once.
 #[derive(Debug, Default)]
 pub struct RowStorage<'a, const K: usize> {
     /// Form factors, `n` for each row.

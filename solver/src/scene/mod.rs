@@ -148,6 +148,26 @@ mod tests {
     }
 
     #[test]
+    fn a_unit_vector_keeps_its_bits() {
+        let unit = |direction| {
+            let sun = Source::Sun {
+                direction,
+                angle: 0.0,
+            };
+            let sun = Luminaire::new(0, Rgb::WHITE, sun).unwrap();
+            match *sun.source() {
+                Source::Sun { direction, .. } => direction,
+                _ => Vec3::ZERO,
+            }
+        };
+        for i in 1..10_000 {
+            let turn = Vec3::new(0.618, 0.755, 0.57) * i as f32;
+            let once = unit(turn.fract() - 0.5);
+            assert_eq!(unit(once), once, "{i}");
+        }
+    }
+
+    #[test]
     fn directions_of_any_length_become_unit_vectors() {
         let sun = |direction| {
             Luminaire::new(

@@ -161,8 +161,15 @@ fn finite(v: Vec3) -> Result<Vec3, LuminaireError> {
     }
 }
 
+/// Roundings by which the squared length of a vector that was scaled to length one is off: at most 12 halves.
+const ROUNDINGS: f32 = 8.0 * f32::EPSILON;
+
+/// The direction with length one; one that has it keeps its bits, so that what is written and read again is the same.
 fn unit(direction: Vec3) -> Result<Vec3, LuminaireError> {
     let direction = finite(direction)?;
+    if (direction.length_squared() - 1.0).abs() <= ROUNDINGS {
+        return Ok(direction);
+    }
     // The square of a very long or very short vector leaves the range of f32.
     let scaled = || (direction / direction.abs().max_element()).try_normalize();
     direction

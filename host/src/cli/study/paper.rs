@@ -7,6 +7,7 @@ use serde_json::{Map, Value, json};
 
 use super::table::Table;
 use crate::cli::{tell, write_file};
+use crate::study::paper::early::{FirstLook, Stored};
 use crate::study::paper::job::Errors;
 use crate::study::paper::{self, Report, large};
 
@@ -32,7 +33,7 @@ pub fn run(folder: &Path) -> Result<Value> {
     Ok(json(&report))
 }
 
-fn tables(report: &Report) -> [(&'static str, Table); 7] {
+fn tables(report: &Report) -> [(&'static str, Table); 9] {
     [
         (
             "Table 1, sampling: 100 shots, analytic kernel x 4 rays, no row kept; one thread",
@@ -40,6 +41,14 @@ fn tables(report: &Report) -> [(&'static str, Table); 7] {
         ),
         ("Rows kept, to 1 % of the worst light", cached(report)),
         ("Distinct rows of a bake by rows", rows(report)),
+        (
+            "Exact rows until the worst light's error is small, eight lights",
+            first_looks(report),
+        ),
+        (
+            "Bytes of row storage against rows evaluated, eight lights, 960 elements, f32",
+            storage(report),
+        ),
         (
             "Eight lights: exact rows once, hemicubes for every light",
             job(report),
@@ -144,6 +153,65 @@ fn rows(report: &Report) -> Table {
         name: "rows",
         header: &["reflectance", "rows", "shooters", "patches"],
         rows: report.rows.iter().map(row).collect(),
+    }
+}
+
+fn first_looks(report: &Report) -> Table {
+    let row = |look: &FirstLook| {
+        let [none, lamps] = look.closed_errors.map(number);
+        let counts = [look.plain, look.kept, look.closed].map(|count| count.to_string());
+        let case = [look.scaled.name(), look.goal.norm.name()].map(str::to_owned);
+        let case = case.into_iter().chain([number(look.goal.error)]);
+        case.chain(counts).chain([none, lamps]).collect()
+    };
+    Table {
+        name: "first_looks",
+        header: &[
+            "scaled_to_0.8",
+            "norm",
+            "error",
+            "plain_shots",
+            "kept_rows",
+            "closed_rows",
+            "closed_error_no_rows",
+            "closed_error_lamps",
+        ],
+        rows: report.first_looks.iter().map(row).collect(),
+    }
+}
+
+fn storage(report: &Report) -> Table {
+    let row = |stored: &Stored| {
+        let [five, one] = stored.to_errors.map(|rows| rows.to_string());
+        let to_residual = stored
+            .to_residual
+            .map_or_else(String::new, |n| n.to_string());
+        let end = if stored.is_closed {
+            "closed"
+        } else {
+            "ambient"
+        };
+        let kib = number(stored.bytes as f64 / 1024.0);
+        vec![
+            stored.rows.to_string(),
+            end.to_owned(),
+            kib,
+            to_residual,
+            five,
+            one,
+        ]
+    };
+    Table {
+        name: "storage",
+        header: &[
+            "rows_kept",
+            "missing_rows",
+            "kib",
+            "rows_to_residual_1e-3",
+            "rows_to_5_percent",
+            "rows_to_1_percent",
+        ],
+        rows: report.storage.iter().map(row).collect(),
     }
 }
 
@@ -293,7 +361,20 @@ fn json(report: &Report) -> Value {
         "rows": rows.collect::<Map<_, _>>(),
         "shooters": report.rows.iter().map(|r| r.shooters).max(),
         "patches": report.rows.iter().map(|r| r.patches).max(),
-        "shots_to_5_percent": {"plain": report.first_look.plain, "kept": report.first_look.kept},
+        "shots_to_5_percent": report.first_looks.first().map(|look| {
+            json!({"plain": look.plain, "kept": look.kept, "closed": look.closed})
+        }),
+        "row_storage": report.storage.iter().map(|stored| {
+            let [five, one] = stored.to_errors;
+            json!({
+                "rows": stored.rows,
+                "bytes": stored.bytes,
+                "closed": stored.is_closed,
+                "rows_to_residual": stored.to_residual,
+                "rows_to_5_percent": five,
+                "rows_to_1_percent": one,
+            })
+        }).collect::<Vec<_>>(),
         "scenes": report.large.len(),
     })
 }

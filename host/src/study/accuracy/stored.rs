@@ -1,13 +1,13 @@
 //! A result as it is stored: floats, half floats, 8-bit codes.
 
 use half::f16;
-use relume::atlas::{Atlas, Channels, Quantity};
+use relume::atlas::{Atlas, Quantity};
 use relume::code::Code;
 use relume::color::Rgb;
 
 use super::AccuracyError;
 use super::ways::Way;
-use crate::pack::{Format, pack, unpack};
+use crate::pack::{Format, PackError, contributions, pack};
 use crate::solution::Solution;
 
 /// How a result is stored.
@@ -61,12 +61,11 @@ impl Storage {
             Self::F16 => as_f16(&solution.contributions, solution.lights.len()),
             Self::Exp8s => {
                 let format = Format {
-                    code: Code::Exp8s,
-                    channels: Channels::Rgb,
+                    packing: Code::Exp8s.into(),
                     quantity: Quantity::Irradiance,
                     mesh: false,
                 };
-                unpack(&Atlas::parse(&pack(solution, format)?)?).contributions
+                contributions(&Atlas::parse(&pack(solution, format)?)?).map_err(PackError::from)?
             }
         })
     }

@@ -8,9 +8,11 @@ use relume::form_factor::Shooter;
 use relume::geometry::{Polygon, gauss_points};
 use relume::mesh::Mesh;
 use relume::scene::{Luminaire, Surface};
+use relume::visibility::{Shaft, Visibility};
 
 use super::AccuracyError;
-use crate::bake::{Meshed, Settings};
+use crate::bake::{Meshed, Missing, Settings};
+use crate::bvh::Bvh;
 use crate::gather::RAYS_PER_PASS;
 use crate::mesh::OwnedMesh;
 use crate::rows::{Parallel, RowFiller};
@@ -51,10 +53,12 @@ pub enum Family {
     Plain,
     /// The same with the ambient term (Cohen et al. 1988).
     Ambient,
-    /// Rows are kept, and their patches solved for.
+    /// Rows are kept, and their patches solved for; an ambient term stands for the others.
     Cached,
     /// Patches are divided where direct light varies, too.
     Split,
+    /// The same with missing rows estimated: analytic kernel times four segments, receiver sums scaled.
+    Closed,
     /// The same with hemicube rows.
     Hemicube,
     /// The same with rows of an analytic kernel times rays (Baum et al. 1989; Wallace et al. 1989).
@@ -65,12 +69,13 @@ pub enum Family {
 
 impl Family {
     /// All of them, the published ones first.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Published,
         Self::Plain,
         Self::Ambient,
         Self::Cached,
         Self::Split,
+        Self::Closed,
         Self::Hemicube,
         Self::Rays,
         Self::Gather,
@@ -85,6 +90,7 @@ impl Family {
             Self::Ambient => "plain + ambient",
             Self::Cached => "cached exact rows",
             Self::Split => "split + exact rows",
+            Self::Closed => "split + closed rows",
             Self::Hemicube => "split + hemicube rows",
             Self::Rays => "split + analytic x rays",
             Self::Gather => "gather rays",
@@ -143,7 +149,7 @@ pub(super) fn ways(ours: &Settings, mesh: &OwnedMesh) -> Vec<Way> {
             plain(shots),
         ));
         let settings = Settings {
-            ambient: true,
+            missing: Missing::Ambient,
             ..plain(shots)
         };
         ways.push(way(Family::Ambient, variant, Rows::Exact, settings));
@@ -152,6 +158,7 @@ pub(super) fn ways(ours: &Settings, mesh: &OwnedMesh) -> Vec<Way> {
         let shots = lamps + others * quarters / 4;
         let settings = Settings {
             shots: Some(shots),
+            missing: Missing::Ambient,
             ..whole.clone()
         };
         ways.push(way(
@@ -172,6 +179,15 @@ pub(super) fn ways(ours: &Settings, mesh: &OwnedMesh) -> Vec<Way> {
             is_ours,
             ..way(Family::Split, variant, Rows::Exact, settings)
         });
+    }
+    let more = [0, 1, 2, 4].map(|quarters| lamps + others * quarters / 4);
+    for shots in [0].into_iter().chain(more) {
+        let settings = Settings {
+            shots: Some(shots),
+            ..ours.clone()
+        };
+        let variant = format!("{shots} rows");
+        ways.push(way(Family::Closed, variant, Rows::Exact, settings));
     }
     for resolution in [64, 128, 256] {
         let variant = format!("{resolution} pixels");
@@ -228,6 +244,7 @@ const fn way(family: Family, variant: String, rows: Rows, settings: Settings) ->
 #[derive(Default)]
 struct Log {
     shooters: RefCell<Vec<Polygon>>,
+    estimated: RefCell<Vec<Polygon>>,
     time: Cell<Duration>,
 }
 
@@ -238,6 +255,10 @@ struct Logged<'a, F> {
 }
 
 impl<F: RowFiller> RowFiller for Logged<'_, F> {
+    fn visibility(&self) -> &impl Visibility {
+        self.filler.visibility()
+    }
+
     fn luminaire(&self, mesh: &Mesh, luminaire: &Luminaire, far: f32, row: &mut [f32]) {
         self.filler.luminaire(mesh, luminaire, far, row);
     }
@@ -247,6 +268,11 @@ impl<F: RowFiller> RowFiller for Logged<'_, F> {
         self.filler.shooter(mesh, shooter, row);
         self.log.time.set(self.log.time.get() + start.elapsed());
         self.log.shooters.borrow_mut().push(*shooter);
+    }
+
+    fn estimate(&self, mesh: &Mesh, shooter: &Polygon, row: &mut [f32]) {
+        self.filler.estimate(mesh, shooter, row);
+        self.log.estimated.borrow_mut().push(*shooter);
     }
 }
 
@@ -287,7 +313,7 @@ fn run(meshed: &Meshed, way: &Way) -> Result<Run, AccuracyError> {
     let seconds = start.elapsed().as_secs_f64();
     let is_gathered = matches!(rows, Rows::Gather);
     Ok(Run {
-        work: work(meshed, rows, &solution, &log.shooters.borrow()),
+        work: work(meshed, rows, &solution, log),
         row_seconds: (!is_gathered).then(|| log.time.get().as_secs_f64()),
         solution,
         seconds,
@@ -299,7 +325,8 @@ const fn logged<F>(filler: F, log: &Log) -> Logged<'_, F> {
 }
 
 /// Counts what the rows of these shooters took, and the rays that were gathered.
-fn work(meshed: &Meshed, rows: Rows, solution: &Solution, shooters: &[Polygon]) -> Work {
+fn work(meshed: &Meshed, rows: Rows, solution: &Solution, log: &Log) -> Work {
+    let shooters = &log.shooters.borrow();
     let mesh = meshed.mesh().view();
     let elements = mesh.elements.iter();
     let receivers: Vec<Polygon> = elements.filter_map(|e| mesh.element_polygon(e)).collect();
@@ -326,11 +353,15 @@ fn work(meshed: &Meshed, rows: Rows, solution: &Solution, shooters: &[Polygon]) 
                 pixels: 0,
             }
         }
-        Rows::Exact => Work {
-            rows: rows_filled,
-            factors: faced(shooters).1,
-            ..Work::default()
-        },
+        Rows::Exact => {
+            let (factors, rays) = estimates(meshed.bvh(), &receivers, &log.estimated.borrow());
+            Work {
+                rows: rows_filled,
+                factors: faced(shooters).1 + factors,
+                rays,
+                pixels: 0,
+            }
+        }
         Rows::Rays { side } => {
             let (pairs, _) = faced(shooters);
             Work {
@@ -346,6 +377,24 @@ fn work(meshed: &Meshed, rows: Rows, solution: &Solution, shooters: &[Polygon]) 
             ..Work::default()
         },
     }
+}
+
+/// Factors and segments that estimates took: one factor where the middle of a receiver is enough, else one for each
+/// receiver point, with a segment each where something may stand between.
+fn estimates(bvh: &Bvh, receivers: &[Polygon], shooters: &[Polygon]) -> (u64, u64) {
+    let (mut factors, mut rays) = (0, 0);
+    for polygon in shooters {
+        let shooter = Shooter::new(*polygon);
+        for receiver in receivers.iter().filter(|r| !shooter.is_out_of_sight(r)) {
+            let points = gauss_points(receiver).len() as u64;
+            let mut is_open = true;
+            bvh.between(&Shaft::new(receiver, polygon), &mut |_| is_open = false);
+            let is_middle = is_open && !shooter.is_near(receiver);
+            factors += if is_middle { 1 } else { points };
+            rays += if is_open { 0 } else { points };
+        }
+    }
+    (factors, rays)
 }
 
 fn emitting(mesh: &Mesh) -> Vec<Polygon> {

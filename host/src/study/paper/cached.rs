@@ -12,9 +12,10 @@ use super::clock::{median, tried};
 use super::rooms::{Room, SPACING, only, room};
 use crate::bake::Memory;
 use crate::bake::{Method, Settings, bake};
+use crate::reference::dense::DenseSolution;
 use crate::rows::{Parallel, RowFiller as _};
 use crate::study::stability::with_reflectance;
-use crate::study::system::{Field, LANES, Refined, System, Way};
+use crate::study::system::{LANES, System, Way};
 
 /// Residual that rows end at if their number does not.
 const RESIDUAL: f32 = 1e-6;
@@ -74,19 +75,19 @@ pub fn measure(lights: u32, repeats: usize) -> Result<Cached> {
 }
 
 /// The rows of a room, exact, and the solution for them.
-fn reference(room: &Room) -> Result<(System, Field)> {
+pub(super) fn reference(room: &Room) -> Result<(System, DenseSolution)> {
     let filler = Parallel::new(&room.mesh.view(), &room.bvh);
     let system = System::new(room.mesh.clone(), room.lights(), &filler);
-    let truth = system.dense()?.irradiance;
-    Ok((system, truth))
+    let dense = system.dense()?;
+    Ok((system, dense))
 }
 
 /// Fewest rows with which the error is small enough, all larger numbers being so as well.
 fn rows_needed(room: &Room) -> Result<u32> {
-    let (system, truth) = reference(room)?;
+    let (system, dense) = reference(room)?;
     let is_enough = |rows: u32| -> Result<bool> {
         let refined = system.refine(Way::kept(rows, RESIDUAL))?;
-        Ok(system.worst_error(&refined.with_ambient(), &truth) <= ERROR)
+        Ok(system.worst_error(&refined.with_ambient(), &dense.irradiance) <= ERROR)
     };
     let mut rows = system.refine(Way::kept(u32::MAX, RESIDUAL))?.shooters.len() as u32;
     while rows > 1 && is_enough(rows - 1)? {
@@ -146,36 +147,4 @@ pub fn rows() -> Result<Vec<Rows>> {
         })
     };
     [0.5, 0.99].map(of).into_iter().collect()
-}
-
-/// Shots, and rows, until the worst light's error is 5 %.
-#[derive(Clone, Debug)]
-pub struct FirstLook {
-    /// Plain shots.
-    pub plain: u32,
-    /// Kept rows, with the ambient term.
-    pub kept: u32,
-}
-
-/// The room with eight lights, its reflectances scaled to 0.8.
-pub fn first_look() -> Result<FirstLook> {
-    let scene = with_reflectance(&room(8)?, 0.8)?;
-    let (system, truth) = reference(&Room::new(scene, SPACING)?)?;
-    let first = |way: fn(u32, f32) -> Way, field: fn(&Refined) -> Field| -> Result<u32> {
-        let (mut low, mut high) = (0, 2048);
-        while high - low > 1 {
-            let middle = u32::midpoint(low, high);
-            let refined = system.refine(way(middle, RESIDUAL))?;
-            if system.worst_error(&field(&refined), &truth) <= 0.05 {
-                high = middle;
-            } else {
-                low = middle;
-            }
-        }
-        Ok(high)
-    };
-    Ok(FirstLook {
-        plain: first(Way::published, |refined| refined.irradiance.clone())?,
-        kept: first(Way::kept, Refined::with_ambient)?,
-    })
 }

@@ -11,6 +11,7 @@ use relume::form_factor::Shooter;
 use relume::geometry::Polygon;
 use relume::mesh::{Element, Mesh};
 use relume::scene::Luminaire;
+use relume::visibility::Visibility;
 
 use super::cached::solve;
 use super::clock::{median, published, tried};
@@ -142,6 +143,10 @@ fn hemicube(room: &Room) -> Hemicube<'_> {
 struct Fine<'a>(&'a Bvh);
 
 impl RowFiller for Fine<'_> {
+    fn visibility(&self) -> &impl Visibility {
+        self.0
+    }
+
     fn luminaire(&self, mesh: &Mesh, luminaire: &Luminaire, far: f32, row: &mut [f32]) {
         Parallel::new(mesh, self.0).luminaire(mesh, luminaire, far, row);
     }

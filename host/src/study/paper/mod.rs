@@ -6,7 +6,8 @@
 //! are medians of several repeats; published ones stand beside them as they were printed.
 
 pub mod cached;
-mod clock;
+pub(super) mod clock;
+pub mod early;
 pub mod faces;
 pub mod job;
 pub mod large;
@@ -20,7 +21,8 @@ use anyhow::Result;
 use rayon::ThreadPoolBuilder;
 
 use crate::chart::Chart;
-use cached::{Cached, FirstLook, Rows};
+use cached::{Cached, Rows};
+use early::{FirstLook, Stored};
 use faces::Faces;
 use job::SeedJob;
 use large::Large;
@@ -42,8 +44,10 @@ pub struct Report {
     pub cached: Vec<Cached>,
     /// Rows by reflectance.
     pub rows: Vec<Rows>,
-    /// Shots and rows to 5 %.
-    pub first_look: FirstLook,
+    /// Shots and rows to 5 % and 1 %.
+    pub first_looks: Vec<FirstLook>,
+    /// Bytes of row storage against rows evaluated.
+    pub storage: Vec<Stored>,
     /// Hemicubes against exact rows.
     pub job: SeedJob,
     /// Table 2.
@@ -82,7 +86,9 @@ fn measure(data: &Path, repeats: usize, watch: impl Fn(&str)) -> Result<Report> 
     // 64 separate solves are so many that they even out by themselves.
     let cached = [(8, few), (64, 1)].map(|(lights, repeats)| cached::measure(lights, repeats));
     let rows = cached::rows()?;
-    let first_look = cached::first_look()?;
+    watch("rows until an error is small");
+    let first_looks = early::first_looks()?;
+    let storage = early::storage()?;
     watch("hemicubes against exact rows");
     let job = job::measure(few)?;
     watch("reconstruction");
@@ -98,7 +104,8 @@ fn measure(data: &Path, repeats: usize, watch: impl Fn(&str)) -> Result<Report> 
         sampling: sampling.into_iter().collect::<Result<_>>()?,
         cached: cached.into_iter().collect::<Result<_>>()?,
         rows,
-        first_look,
+        first_looks,
+        storage,
         job,
         reconstruction: reconstruction.into_iter().collect::<Result<_>>()?,
         large,

@@ -4,10 +4,12 @@ use std::hint::black_box;
 use std::ops::ControlFlow;
 
 use anyhow::Result;
-use relume::atlas::{Atlas, Channels, Quantity};
-use relume::code::{Code, DecodeTable};
+use relume::atlas::{Atlas, Quantity};
+use relume::code::Code;
 use relume::color::Rgb;
-use relume::relight::{FixedMix, change_fixed, float_weights, relight, relight_fixed};
+use relume::relight::{
+    DecodeTable, FixedMix, FixedWeight, change_fixed, relight, relight_fixed, table_length,
+};
 
 use super::clock::{median, tried};
 use super::rooms::{SPACING, room};
@@ -49,8 +51,7 @@ pub fn measure(lights: u32, repeats: usize) -> Result<Reconstruction> {
     };
     let solution = bake(&scene, &settings, &mut |_| ControlFlow::Continue(()))?;
     let format = Format {
-        code: Code::Exp8s,
-        channels: Channels::Rgb,
+        packing: Code::Exp8s.into(),
         quantity: Quantity::Irradiance,
         mesh: false,
     };
@@ -59,17 +60,19 @@ pub fn measure(lights: u32, repeats: usize) -> Result<Reconstruction> {
     let mix = vec![Rgb::splat(0.5); lights as usize];
     let elements = solution.mesh.elements.len();
 
-    let table = DecodeTable::new();
-    let mut weights = vec![Rgb::BLACK; mix.len()];
+    let mut values = vec![0.0; table_length(&atlas)];
+    let table = DecodeTable::new(&atlas, &mut values)?;
     let mut irradiance = vec![Rgb::BLACK; elements];
     let mut in_floats = || -> Result<()> {
-        float_weights(&atlas, black_box(&mix), &mut weights)?;
-        relight(&atlas, &table, &weights, &mut irradiance)?;
+        relight(&atlas, &table, black_box(&mix), &mut irradiance)?;
         black_box(&irradiance);
         Ok(())
     };
     let brightest = vec![Rgb::WHITE; mix.len()];
-    let (mut fixed_weights, mut more) = (vec![[0; 3]; mix.len()], vec![[0; 3]; mix.len()]);
+    let (mut fixed_weights, mut more) = (
+        vec![FixedWeight::EMPTY; mix.len()],
+        vec![FixedWeight::EMPTY; mix.len()],
+    );
     let mut sums = vec![[0; 3]; elements];
     let mut in_integers = || -> Result<()> {
         let fixed = FixedMix::new(&atlas, &brightest, black_box(&mix), &mut fixed_weights)?;
@@ -101,7 +104,7 @@ pub fn measure(lights: u32, repeats: usize) -> Result<Reconstruction> {
         float,
         integer,
         change,
-        codes: atlas.all_codes().len(),
+        codes: atlas.code_bytes(),
         atlas: bytes.len(),
     })
 }

@@ -34,6 +34,10 @@ pub struct Kernel<'a, V> {
 }
 
 impl<V: Visibility> RowFiller for Kernel<'_, V> {
+    fn visibility(&self) -> &impl Visibility {
+        self.visibility
+    }
+
     fn luminaire(&self, mesh: &Mesh, luminaire: &Luminaire, far: f32, row: &mut [f32]) {
         luminaire::fill(mesh, luminaire, far, 0, self.visibility, row);
     }

@@ -1,17 +1,14 @@
-//! Values and their 8-bit codes: the exponential code, its tables and its stated error.
+//! The exponential code as published, its table and its stated error.
 //!
 //! `c = round(255 (1 - e^-x))`, decoded as `x = -ln(1 - c / 255)` (adjustable global illumination
 //! with per-light lightmaps, section 2.3: range 5.541 at code 254 to 0.00393 at code 1, 1:1410).
 //! Code 255 is *saturated*: it stands for every `x >= ln 510` and decodes to just that.
-//! A *scale* `s` in front of the code, `x = value / s`, shared by the channels of a light, puts
-//! the range where the light's values are.
+//! A *scale* `s` in front of the code, `x = value / s`, puts the range where the values are.
 //!
 //! Error: a code below 255 stands for `x` between the values that round to its neighbours,
 //! `-ln(1 - (c -+ 1/2) / 255)`; [`error_bound`] is the larger distance to either end. In units of
 //! the scale it grows from 0.00197 at code 0 to 0.693 at code 254. Everything below 0.00197 of the
 //! scale becomes 0 (dead zone).
-
-use core::fmt;
 
 use crate::math;
 
@@ -51,35 +48,6 @@ pub static DECODED: [u16; 256] = [
     36_394, 39_716, 45_394, 51_072,
 ];
 
-/// Which code an atlas is written in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Code {
-    /// As published: one scale for all lights.
-    Exp8,
-    /// One scale per light, which puts its largest value on code 254.
-    Exp8s,
-}
-
-impl Code {
-    /// Every code, in the order of their numbers in files.
-    pub const ALL: [Self; 2] = [Self::Exp8, Self::Exp8s];
-
-    /// The name on the command line.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Exp8 => "exp8",
-            Self::Exp8s => "exp8s",
-        }
-    }
-}
-
-impl fmt::Display for Code {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
 /// The code of `x`, in scales. NaN and negative values give 0.
 #[must_use]
 pub fn encode(x: f32) -> u8 {
@@ -111,34 +79,6 @@ pub fn error_bound(code: u8) -> f32 {
     (edge(0.5) - value).max(value - edge(-0.5).max(0.0))
 }
 
-/// All 256 values of [`decode`], for kernels that look codes up.
-#[derive(Clone, Debug)]
-pub struct DecodeTable([f32; 256]);
-
-impl DecodeTable {
-    /// Computes the table.
-    #[must_use]
-    pub fn new() -> Self {
-        let mut table = [0.0; 256];
-        for (value, code) in table.iter_mut().zip(0..=u8::MAX) {
-            *value = decode(code);
-        }
-        Self(table)
-    }
-
-    /// The value of a code, in scales.
-    #[must_use]
-    pub fn decode(&self, code: u8) -> f32 {
-        lookup(&self.0, code)
-    }
-}
-
-impl Default for DecodeTable {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 /// The value of a code, in 2^-13 scales.
 #[must_use]
 pub fn decode_fixed(code: u8) -> u16 {
@@ -151,84 +91,10 @@ fn lookup<T: Copy>(table: &[T; 256], code: u8) -> T {
     table[code as usize]
 }
 
-/// A positive scale as a 16-bit mantissa and a power of two: `mantissa * 2^exponent`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Scale {
-    mantissa: u16,
-    exponent: i16,
-}
-
-impl Scale {
-    /// One.
-    pub const ONE: Self = Self {
-        mantissa: 1 << 15,
-        exponent: -15,
-    };
-
-    /// The smallest scale not below `value`; `None` unless both are normal positive floats.
-    #[must_use]
-    pub fn at_least(value: f32) -> Option<Self> {
-        if !(value > 0.0 && value.is_normal()) {
-            return None;
-        }
-        let (fraction, exponent) = math::split_exponent(value);
-        let mantissa = math::ceil(math::scale_by_power_of_two(fraction, 16));
-        let (mantissa, exponent) = if mantissa > f32::from(u16::MAX) {
-            (1 << 15, exponent - 15)
-        } else {
-            (mantissa as u16, exponent - 16)
-        };
-        let scale = Self {
-            mantissa,
-            exponent: exponent as i16,
-        };
-        scale.value().is_normal().then_some(scale)
-    }
-
-    /// The scale that puts `largest` on code 254; [`Self::ONE`] for a light that is
-    /// dark, or too dim for the range of floats.
-    ///
-    /// `None` for a value that is negative or not finite.
-    #[must_use]
-    pub fn fitting(largest: f32) -> Option<Self> {
-        if !(largest >= 0.0 && largest.is_finite()) {
-            return None;
-        }
-        Some(Self::at_least(largest / LARGEST).unwrap_or(Self::ONE))
-    }
-
-    /// From its parts as stored; `None` unless the mantissa has its top bit set and the value is a
-    /// finite, normal `f32`.
-    #[must_use]
-    pub fn from_parts(mantissa: u16, exponent: i16) -> Option<Self> {
-        let scale = Self { mantissa, exponent };
-        (mantissa >= 1 << 15 && scale.value().is_normal()).then_some(scale)
-    }
-
-    /// Mantissa, in [32 768, 65 535].
-    #[must_use]
-    pub const fn mantissa(self) -> u16 {
-        self.mantissa
-    }
-
-    /// Power of two.
-    #[must_use]
-    pub const fn exponent(self) -> i16 {
-        self.exponent
-    }
-
-    /// The value.
-    #[must_use]
-    pub fn value(self) -> f32 {
-        math::scale_by_power_of_two(f32::from(self.mantissa), i32::from(self.exponent))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     extern crate std;
     use super::*;
-    use proptest::prelude::*;
     use std::vec::Vec;
 
     #[test]
@@ -281,31 +147,5 @@ mod tests {
                 "code {code}: {exact} {fixed}"
             );
         }
-    }
-
-    proptest! {
-        #[test]
-        fn scales_are_close_from_above(value in 1e-30_f32..1e30) {
-            let scale = Scale::at_least(value).unwrap();
-            prop_assert!(scale.value() >= value, "{scale:?}");
-            prop_assert!(scale.value() <= value * (1.0 + 1.0 / 32768.0), "{scale:?}");
-            prop_assert_eq!(Scale::from_parts(scale.mantissa(), scale.exponent()), Some(scale));
-        }
-
-        #[test]
-        fn nothing_saturates_at_its_own_scale(largest in 1e-30_f32..1e30) {
-            let scale = Scale::fitting(largest).unwrap();
-            prop_assert!(encode(largest / scale.value()) <= 254, "{largest} {scale:?}");
-        }
-    }
-
-    #[test]
-    fn illegal_scales_are_refused() {
-        for value in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-            assert_eq!(Scale::at_least(value), None, "{value}");
-        }
-        assert_eq!(Scale::fitting(0.0), Some(Scale::ONE));
-        assert_eq!(Scale::from_parts(1, 0), None);
-        assert_eq!(Scale::from_parts(40_000, 300), None);
     }
 }

@@ -1,0 +1,258 @@
+//! An atlas as source text that firmware links, or as bytes, with what it costs there.
+//!
+//! The bytes are those of the atlas file ([`relume::atlas`]); a device borrows them from flash with
+//! `Atlas::parse`. Beside them stands a number for every light's name, so that code names lights and
+//! not places in a list.
+
+use std::collections::HashSet;
+use std::fmt::Write as _;
+
+use relume::atlas::Atlas;
+use relume::relight::FixedWeight;
+
+/// What an atlas takes on a device that relights it in integers, multiplying on the way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cost {
+    /// Bytes of flash: the atlas.
+    pub flash: u64,
+    /// Bytes of RAM: three `u32` sums per element and the weights.
+    pub ram: u64,
+    /// Bytes more for the table of all products, with which relighting only adds.
+    pub table: u64,
+    /// Multiply-adds of a frame in which every light changed.
+    pub frame: u64,
+    /// Multiply-adds when one light changed.
+    pub change: u64,
+}
+
+impl Cost {
+    /// Of an atlas of so many bytes.
+    #[must_use]
+    pub fn new(atlas: &Atlas, bytes: usize) -> Self {
+        let (n, k) = (
+            u64::from(atlas.element_count()),
+            u64::from(atlas.light_count()),
+        );
+        Self {
+            flash: bytes as u64,
+            ram: n * 12 + k * size_of::<FixedWeight>() as u64,
+            table: relume::relight::table_length(atlas) as u64 * 4,
+            frame: n * k * 3,
+            change: n * 3,
+        }
+    }
+
+    /// As the lines of a comment.
+    fn lines(&self, atlas: &Atlas) -> [String; 5] {
+        let Self {
+            flash,
+            ram,
+            table,
+            frame,
+            change,
+        } = self;
+        let (n, k) = (atlas.element_count(), atlas.light_count());
+        [
+            format!(
+                "Relume atlas: {n} elements, {k} lights. Borrow it with relume::atlas::Atlas::parse."
+            ),
+            format!("Flash: {flash} bytes."),
+            format!(
+                "RAM: {ram} bytes to relight in integers; {table} more to do so by additions alone."
+            ),
+            format!("Frame: {frame} multiply-adds; one changed light: {change}."),
+            match atlas.worst_error() {
+                Some(worst) => format!(
+                    "Error: at most {:.2} display codes as packed, {:.2} as shown.",
+                    worst.packed, worst.shown
+                ),
+                None => "Error: not measured.".to_owned(),
+            },
+        ]
+    }
+}
+
+/// What is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Language {
+    /// One Rust module.
+    Rust,
+    /// A C header and its source.
+    C,
+    /// The bytes, and a text beside them.
+    Binary,
+}
+
+/// The files of an atlas, by name, from the name of the atlas.
+#[must_use]
+pub fn files(
+    atlas: &Atlas,
+    bytes: &[u8],
+    name: &str,
+    language: Language,
+) -> Vec<(String, Vec<u8>)> {
+    let comment = Cost::new(atlas, bytes.len()).lines(atlas);
+    let name = identifier(name).to_lowercase();
+    let lights = light_names(atlas);
+    match language {
+        Language::Rust => vec![(
+            format!("{name}.rs"),
+            rust(bytes, &comment, &lights).into_bytes(),
+        )],
+        Language::C => {
+            let (header, source) = c(bytes, &name, &comment, &lights);
+            vec![
+                (format!("{name}.h"), header.into_bytes()),
+                (format!("{name}.c"), source.into_bytes()),
+            ]
+        }
+        Language::Binary => vec![
+            (format!("{name}.atlas"), bytes.to_vec()),
+            (
+                format!("{name}.txt"),
+                binary_text(&comment, &lights).into_bytes(),
+            ),
+        ],
+    }
+}
+
+fn rust(bytes: &[u8], comment: &[String], lights: &[String]) -> String {
+    let mut text = String::new();
+    for line in comment {
+        let _ = writeln!(text, "//! {line}");
+    }
+    for (light, number) in lights.iter().zip(0..) {
+        let _ = writeln!(
+            text,
+            "\n/// Number of this light.\npub const LIGHT_{light}: u32 = {number};"
+        );
+    }
+    let _ = writeln!(
+        text,
+        "\n/// The bytes of the atlas.\n#[rustfmt::skip]\npub static ATLAS: [u8; {}] = [",
+        bytes.len()
+    );
+    text + &rows(bytes) + "];\n"
+}
+
+fn c(bytes: &[u8], name: &str, comment: &[String], lights: &[String]) -> (String, String) {
+    let comment = format!("/* {} */\n", comment.join("\n * "));
+    let upper = name.to_uppercase();
+    let mut header =
+        format!("{comment}#ifndef {upper}_H\n#define {upper}_H\n\n#include <stdint.h>\n\n");
+    for (light, number) in lights.iter().zip(0..) {
+        let _ = writeln!(header, "#define {upper}_LIGHT_{light} {number}u");
+    }
+    let length = bytes.len();
+    let _ = writeln!(
+        header,
+        "\n#define {upper}_LENGTH {length}u\nextern const uint8_t {name}[{upper}_LENGTH];\n\n#endif"
+    );
+    let source = format!(
+        "{comment}#include \"{name}.h\"\n\nconst uint8_t {name}[{upper}_LENGTH] = {{\n{}}};\n",
+        rows(bytes)
+    );
+    (header, source)
+}
+
+fn binary_text(comment: &[String], lights: &[String]) -> String {
+    let lights = lights
+        .iter()
+        .zip(0..)
+        .map(|(light, number)| format!("Light {number}: {light}"));
+    let lines: Vec<String> = comment.iter().cloned().chain(lights).collect();
+    lines.join("\n") + "\n"
+}
+
+/// The bytes in decimal, twenty a line.
+fn rows(bytes: &[u8]) -> String {
+    let mut text = String::with_capacity(bytes.len() * 4);
+    for row in bytes.chunks(20) {
+        let numbers: Vec<String> = row.iter().map(u8::to_string).collect();
+        text.push_str("    ");
+        text.push_str(&numbers.join(", "));
+        text.push_str(",\n");
+    }
+    text
+}
+
+/// Names of the lights that a program can use: upper case, letters, digits and `_`, all different.
+fn light_names(atlas: &Atlas) -> Vec<String> {
+    let mut taken = HashSet::new();
+    let unique = |light: relume::atlas::AtlasLight| {
+        let name = identifier(light.name).to_uppercase();
+        let numbered = (2..).map(|number| format!("{name}_{number}"));
+        let mut names = std::iter::once(name.clone()).chain(numbered);
+        names
+            .find(|name| taken.insert(name.clone()))
+            .unwrap_or(name)
+    };
+    atlas.lights().map(unique).collect()
+}
+
+/// What is left of a name when all but ASCII letters and digits become `_`; never empty, never a
+/// digit first.
+fn identifier(name: &str) -> String {
+    let sign = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
+    let name: String = name.chars().map(sign).collect();
+    match name.chars().next() {
+        Some(first) if !first.is_ascii_digit() => name,
+        _ => format!("_{name}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use relume::atlas::{Contents, LightEntry, Quantity, size, write};
+    use relume::code::{Code, Scale};
+    use relume::color::Rgb;
+
+    fn atlas() -> Vec<u8> {
+        let light = |name| LightEntry::exponential(name, Rgb::WHITE, Code::Lum8, Scale::ONE);
+        let contents = Contents {
+            quantity: Quantity::Irradiance,
+            lights: &[light("desk lamp"), light("desk-lamp"), light("3")],
+            elements: 2,
+            image_width: 0,
+            errors: None,
+            tiles: &[],
+            mesh: None,
+        };
+        let mut bytes = vec![0; size(&contents).unwrap()];
+        write(&contents, |_, _| Rgb::WHITE, &mut bytes).unwrap();
+        bytes
+    }
+
+    #[test]
+    fn names_are_legal_and_differ() {
+        let bytes = atlas();
+        let names = light_names(&Atlas::parse(&bytes).unwrap());
+        assert_eq!(names, ["DESK_LAMP", "DESK_LAMP_2", "_3"]);
+        assert_eq!(identifier(""), "_");
+    }
+
+    #[test]
+    fn numbers_in_the_text_are_the_bytes() {
+        let bytes = atlas();
+        let atlas = Atlas::parse(&bytes).unwrap();
+        for (language, at) in [(Language::Rust, 0), (Language::C, 1)] {
+            let files = files(&atlas, &bytes, "my room.v2", language);
+            assert!(
+                files
+                    .iter()
+                    .all(|(name, _)| name.starts_with("my_room_v2.")),
+                "{language:?}"
+            );
+            let text = String::from_utf8(files[at].1.clone()).unwrap();
+            let table = text.rsplit_once("= ").unwrap().1;
+            let numbers = table
+                .split(|c: char| !c.is_ascii_digit())
+                .filter(|n| !n.is_empty());
+            let found: Vec<u8> = numbers.map(|n| n.parse().unwrap()).collect();
+            assert_eq!(found, bytes, "{language:?}");
+        }
+        let plain = files(&atlas, &bytes, "a", Language::Binary);
+        assert_eq!(plain[0], ("a.atlas".to_owned(), bytes.clone()));
+    }
+}

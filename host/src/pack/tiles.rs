@@ -1,0 +1,244 @@
+//! Writes the tiles of an atlas: see [`relume::atlas::Tiles`] for what the bits mean.
+
+use rayon::prelude::*;
+use relume::atlas::{
+    ESCAPE, FIRST_BITS, FULL_BITS, LARGEST_SIDE, LightEntry, PREDICTED, Place, places, predict,
+};
+use relume::color::Rgb;
+use relume::mesh::{Element, Face};
+
+use crate::mesh::OwnedMesh;
+use crate::solution::Solution;
+
+/// Sides that are tried; the smallest table wins.
+const SIDES: [u16; 5] = [4, 6, 8, 12, LARGEST_SIDE as u16];
+
+/// The table of tiles of all lights in tiles; empty without one. `values` element by element.
+pub(super) fn encode(solution: &Solution, lights: &[LightEntry], values: &[Rgb]) -> Vec<u8> {
+    let tiled: Vec<(usize, &LightEntry)> = lights
+        .iter()
+        .enumerate()
+        .filter(|(_, light)| light.code.is_tiled())
+        .collect();
+    if tiled.is_empty() {
+        return Vec::new();
+    }
+    let planes: Vec<Vec<[u16; 3]>> = tiled
+        .par_iter()
+        .map(|(tag, light)| codes(light, values.iter().skip(*tag).step_by(lights.len())))
+        .collect();
+    let grids = match solution.image {
+        Some([width, height]) => vec![[width as u16, height as u16]],
+        None => grids(&solution.mesh),
+    };
+    let sides = SIDES.iter().map(|side| table(&grids, *side, &planes));
+    sides.min_by_key(Vec::len).unwrap_or_default()
+}
+
+/// The codes of one light.
+fn codes<'a>(light: &LightEntry, values: impl Iterator<Item = &'a Rgb>) -> Vec<[u16; 3]> {
+    let code =
+        |channel: usize, value: f32| light.curves[channel].encode(value, light.last[channel]);
+    values
+        .map(|value| [code(0, value.r), code(1, value.g), code(2, value.b)])
+        .collect()
+}
+
+/// Width and height of the grids in which the elements of a mesh stand, in their order.
+///
+/// A face of four vertices that was cut both ways is a grid; all between two such faces stand in a row.
+fn grids(mesh: &OwnedMesh) -> Vec<[u16; 2]> {
+    let mut grids = Vec::new();
+    let mut waiting = 0_usize;
+    let flush = |waiting: &mut usize, grids: &mut Vec<[u16; 2]>| {
+        while *waiting > 0 {
+            let width = (*waiting).min(usize::from(u16::MAX));
+            grids.push([width as u16, 1]);
+            *waiting -= width;
+        }
+    };
+    for face in &mesh.faces {
+        match grid(face, &mesh.elements) {
+            Some(grid) => {
+                flush(&mut waiting, &mut grids);
+                grids.push(grid);
+            }
+            None => waiting += face.element_count as usize,
+        }
+    }
+    flush(&mut waiting, &mut grids);
+    grids
+}
+
+fn grid(face: &Face, elements: &[Element]) -> Option<[u16; 2]> {
+    let first = face.first_element as usize;
+    let own = &elements[first..first + face.element_count as usize];
+    let start = own.first()?.from.y;
+    let width = own.iter().take_while(|e| e.from.y == start).count();
+    let rows = own.chunks(width);
+    let is_grid = |row: &[Element]| {
+        row.len() == width
+            && row
+                .iter()
+                .zip(own)
+                .all(|(a, b)| a.from.x == b.from.x && a.to.x == b.to.x && a.from.y == row[0].from.y)
+    };
+    let height = rows.len();
+    let is_flat = width < 2 || height < 2;
+    if is_flat || !own.chunks(width).all(is_grid) {
+        return None;
+    }
+    Some([u16::try_from(width).ok()?, u16::try_from(height).ok()?])
+}
+
+/// A whole table with tiles of this side.
+fn table(grids: &[[u16; 2]], side: u16, planes: &[Vec<[u16; 3]>]) -> Vec<u8> {
+    let largest = planes.iter().flatten().map(|code| code[1]).max();
+    let first_bits = (u16::BITS - largest.unwrap_or(0).leading_zeros()).max(1);
+    let places: Vec<Place> = places(grids.iter().copied(), side).collect();
+    let tiles: Vec<Vec<u8>> = places
+        .par_iter()
+        .map(|place| tile(*place, first_bits, planes))
+        .collect();
+
+    let mut bytes = vec![side as u8, first_bits as u8, 0, 0];
+    bytes.extend((grids.len() as u32).to_le_bytes());
+    bytes.extend((tiles.len() as u32).to_le_bytes());
+    for [width, height] in grids {
+        bytes.extend(width.to_le_bytes());
+        bytes.extend(height.to_le_bytes());
+    }
+    let mut offset = 0_u32;
+    for tile in &tiles {
+        bytes.extend(offset.to_le_bytes());
+        // An atlas that does not fit 4 GiB is refused when it is written.
+        offset = offset.wrapping_add(tile.len() as u32);
+    }
+    bytes.extend(tiles.into_iter().flatten());
+    bytes
+}
+
+/// All lights of one tile.
+fn tile(place: Place, first_bits: u32, planes: &[Vec<[u16; 3]>]) -> Vec<u8> {
+    let mut bits = BitWriter::default();
+    for plane in planes {
+        let own: Vec<[i32; 3]> = place
+            .elements()
+            .map(|element| plane[element as usize].map(i32::from))
+            .collect();
+        if own.iter().flatten().all(|code| *code == 0) {
+            bits.put(0, 1);
+            continue;
+        }
+        bits.put(1, 1);
+        for channel in [1, 0, 2] {
+            let coded: Vec<i32> = own
+                .iter()
+                .map(|codes| codes[channel] - if channel == 1 { 0 } else { codes[1] })
+                .collect();
+            put_plane(
+                &coded,
+                usize::from(place.columns),
+                (channel == 1).then_some(first_bits),
+                &mut bits,
+            );
+        }
+    }
+    bits.finish()
+}
+
+/// One of the three coded planes of a light; the first value of green takes `first_bits`.
+fn put_plane(coded: &[i32], columns: usize, first_bits: Option<u32>, bits: &mut BitWriter) {
+    let rest: Vec<u32> = (1..coded.len())
+        .map(|at| {
+            let (column, above) = (at % columns, at.checked_sub(columns));
+            let left = (column > 0).then(|| coded[at - 1]);
+            let corner = above
+                .filter(|_| column > 0)
+                .map_or(0, |above| coded[above - 1]);
+            fold(coded[at] - predict(left, above.map(|at| coded[at]), corner))
+        })
+        .collect();
+    let parameter = if rest.iter().all(|z| *z == 0) {
+        PREDICTED
+    } else {
+        let cost = |m: &u32| {
+            rest.iter()
+                .map(|z| u64::from(rice_bits(*z, *m)))
+                .sum::<u64>()
+        };
+        (0..PREDICTED).min_by_key(cost).unwrap_or(0)
+    };
+    bits.put(parameter, 4);
+    match first_bits {
+        Some(count) => bits.put(coded[0] as u32, count),
+        None => {
+            let first = fold(coded[0]) + (1 << FIRST_BITS);
+            let below = u32::BITS - 1 - first.leading_zeros();
+            let ones = below - FIRST_BITS;
+            bits.put_ones(ones);
+            bits.put(first - (1 << below), below);
+        }
+    }
+    if parameter != PREDICTED {
+        rest.iter().for_each(|z| put_rice(*z, parameter, bits));
+    }
+}
+
+/// `0, 1, 2, 3, 4, ...` from `0, -1, 1, -2, 2, ...`.
+const fn fold(value: i32) -> u32 {
+    ((value << 1) ^ (value >> 31)) as u32
+}
+
+const fn rice_bits(z: u32, m: u32) -> u32 {
+    let ones = z >> m;
+    if ones >= ESCAPE {
+        ESCAPE + FULL_BITS
+    } else {
+        ones + 1 + m
+    }
+}
+
+fn put_rice(z: u32, m: u32, bits: &mut BitWriter) {
+    let ones = z >> m;
+    if ones >= ESCAPE {
+        bits.put((1 << ESCAPE) - 1, ESCAPE);
+        bits.put(z, FULL_BITS);
+    } else {
+        bits.put_ones(ones);
+        bits.put(z - (ones << m), m);
+    }
+}
+
+/// Collects bits, highest first.
+#[derive(Default)]
+struct BitWriter {
+    bytes: Vec<u8>,
+    /// Bits that do not fill a byte yet, at the bottom.
+    buffer: u64,
+    held: u32,
+}
+
+impl BitWriter {
+    /// The lower `count` bits of a value, at most 32.
+    fn put(&mut self, value: u32, count: u32) {
+        self.buffer = (self.buffer << count) | u64::from(value);
+        self.held += count;
+        while self.held >= 8 {
+            self.held -= 8;
+            self.bytes.push((self.buffer >> self.held) as u8);
+        }
+    }
+
+    /// So many ones, at most 31, and a zero.
+    fn put_ones(&mut self, count: u32) {
+        self.put((2 << count) - 2, count + 1);
+    }
+
+    fn finish(mut self) -> Vec<u8> {
+        if self.held > 0 {
+            self.put(0, 8 - self.held);
+        }
+        self.bytes
+    }
+}

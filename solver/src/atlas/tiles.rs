@@ -1,0 +1,380 @@
+//! Tiles: codes of neighbouring elements as small differences, in as many bits as they need.
+//!
+//! Elements stand in *grids* of `width` columns, row by row; a grid is cut into tiles of `side x side`
+//! elements (fewer at its end), a grid of one row into tiles of `side^2` elements. A tile holds, light after light, what every one of its elements gets:
+//! `g`, then `r - g`, then `b - g`, of whole-number codes `r, g, b` in common steps, so that the same hue
+//! costs nothing. Each of the three is predicted from its left neighbour `a`, the upper `b` and the upper left `c`
+//! (Weinberger, Seroussi and Sapiro 2000, LOCO-I, eq. 1): `min(a, b)` if `c >= max(a, b)`,
+//! `max(a, b)` if `c <= min(a, b)`, else the plane `a + b - c`. What is left, `e`, is written as
+//! `z = 2 e` or `-2 e - 1`: `z >> m` ones, a zero, and the lower `m` bits (Rice 1979), `m` once per tile, light and
+//! channel.
+//!
+//! Little-endian, lengths in bytes, `g` grids, `t` tiles (which follow from grids and side):
+//!
+//! | at | what |
+//! | --- | --- |
+//! | 0 | `u8` side, 1 to [`LARGEST_SIDE`] |
+//! | 1 | `u8` bits of a first `g`, 1 to 16 |
+//! | 2 | two zero bytes |
+//! | 4 | `u32` grids `g` |
+//! | 8 | `u32` tiles `t` |
+//! | 12 | `g` grids of 4: width `u16`, height `u16`, both at least 1; together they have all elements |
+//! | | `t` times `u32`: where the bits of a tile begin, in bytes from the first |
+//! | | the bits, highest first |
+//!
+//! Bits of a tile: for every light in tiles one bit, 0 when all its codes are 0 here. Else for `g`, `r - g`, `b - g`: four
+//! bits `m`, 15 when all is as predicted; the first value (`g` itself in its bits; of the others `z` as
+//! ones, as many as `(z + 8) >> 3` has bits but one, a zero, and the bits of `z + 8` below its highest); then, unless `m = 15`,
+//! the others: [`ESCAPE`] ones stand before 18 bits of `z` itself. Bits past the end are 0.
+
+use super::AtlasError;
+
+/// Most elements along a tile.
+pub const LARGEST_SIDE: usize = 16;
+
+/// Ones before a difference that is written in full.
+pub const ESCAPE: u32 = 16;
+
+/// Bits of a difference that is written in full.
+pub const FULL_BITS: u32 = 18;
+
+/// Where `m` says that all is as predicted.
+pub const PREDICTED: u32 = 15;
+
+/// Bits of a first difference below its highest, at least.
+pub const FIRST_BITS: u32 = 3;
+
+const HEADER_BYTES: usize = 12;
+
+/// The tiles of a checked atlas.
+#[derive(Clone, Copy, Debug)]
+pub struct Tiles<'a> {
+    side: u16,
+    first_bits: u32,
+    grids: &'a [u8],
+    offsets: &'a [u8],
+    bits: &'a [u8],
+}
+
+/// Where the elements of a tile stand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// Its first element.
+    pub first: u32,
+    /// From an element to the one below it.
+    pub stride: u32,
+    /// Columns, at most [`LARGEST_SIDE`], or its square in one row.
+    pub columns: u16,
+    /// Rows, at most [`LARGEST_SIDE`].
+    pub rows: u16,
+}
+
+impl Place {
+    /// Its elements, row by row.
+    pub fn elements(self) -> impl Iterator<Item = u32> {
+        let row = move |row: u32| self.first + row * self.stride;
+        (0..u32::from(self.rows)).flat_map(move |r| row(r)..row(r) + u32::from(self.columns))
+    }
+}
+
+/// Codes of one light in a tile, row by row: red, green, blue.
+pub type Block = [[u16; 3]; LARGEST_SIDE * LARGEST_SIDE];
+
+impl<'a> Tiles<'a> {
+    /// Checks a table of tiles for so many elements.
+    pub(super) fn parse(bytes: &'a [u8], elements: u32) -> Result<Self, AtlasError> {
+        let illegal = AtlasError::Illegal("table of tiles");
+        let (header, rest) = bytes.split_first_chunk::<HEADER_BYTES>().ok_or(illegal)?;
+        let [side, first_bits, 0, 0, g0, g1, g2, g3, t0, t1, t2, t3] = *header else {
+            return Err(illegal);
+        };
+        let count = |bytes| 4 * u64::from(u32::from_le_bytes(bytes));
+        let (grids, tiles) = (count([g0, g1, g2, g3]), count([t0, t1, t2, t3]));
+        if grids + tiles > rest.len() as u64
+            || !(1..=LARGEST_SIDE).contains(&usize::from(side))
+            || !(1..=16).contains(&first_bits)
+        {
+            return Err(illegal);
+        }
+        let (grids, rest) = rest.split_at_checked(grids as usize).ok_or(illegal)?;
+        let (offsets, bits) = rest.split_at_checked(tiles as usize).ok_or(illegal)?;
+        let tiles = Self {
+            side: side.into(),
+            first_bits: first_bits.into(),
+            grids,
+            offsets,
+            bits,
+        };
+        let (mut held, mut count) = (0_u64, 0_u64);
+        for [width, height] in tiles.grids() {
+            if width == 0 || height == 0 {
+                return Err(illegal);
+            }
+            held += u64::from(width) * u64::from(height);
+            let (along, down) = sides(tiles.side, height);
+            count += u64::from(width.div_ceil(along)) * u64::from(height.div_ceil(down));
+        }
+        let offsets = tiles.offsets.as_chunks::<4>().0;
+        let is_inside = |offset: &[u8; 4]| u32::from_le_bytes(*offset) as usize <= bits.len();
+        if held != elements.into() || count != tiles.len() as u64 || !offsets.iter().all(is_inside)
+        {
+            return Err(illegal);
+        }
+        Ok(tiles)
+    }
+
+    /// Elements along a tile.
+    #[must_use]
+    pub const fn side(&self) -> u16 {
+        self.side
+    }
+
+    /// How many tiles there are.
+    #[must_use]
+    pub const fn len(&self) -> usize {
+        self.offsets.len() / 4
+    }
+
+    /// True without a tile.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.offsets.is_empty()
+    }
+
+    /// Width and height of every grid.
+    fn grids(&self) -> impl Iterator<Item = [u16; 2]> + use<'a> {
+        let grids = self.grids.as_chunks::<4>().0.iter();
+        grids.map(|[w0, w1, h0, h1]| [[*w0, *w1], [*h0, *h1]].map(u16::from_le_bytes))
+    }
+
+    /// Where every tile stands, with the bits from its beginning on.
+    pub fn iter(&self) -> impl Iterator<Item = (Place, TileBits<'a>)> + use<'a> {
+        let (bits, first_bits) = (self.bits, self.first_bits);
+        let offsets = self.offsets.as_chunks::<4>().0.iter();
+        let offsets = offsets.map(|offset| u32::from_le_bytes(*offset) as usize);
+        let bits = offsets.map(move |offset| TileBits {
+            bits: Bits::new(bits.get(offset..).unwrap_or_default()),
+            first_bits,
+        });
+        places(self.grids(), self.side).zip(bits)
+    }
+}
+
+/// Where the tiles of some grids stand, in their order.
+pub fn places(grids: impl Iterator<Item = [u16; 2]>, side: u16) -> impl Iterator<Item = Place> {
+    let starts = grids.scan(0_u32, |next, [width, height]| {
+        let first = *next;
+        *next += u32::from(width) * u32::from(height);
+        Some((first, width, height))
+    });
+    starts.flat_map(move |(first, width, height)| {
+        let (along, down) = sides(side, height);
+        (0..height).step_by(down.into()).flat_map(move |y| {
+            (0..width).step_by(along.into()).map(move |x| Place {
+                first: first + u32::from(y) * u32::from(width) + u32::from(x),
+                stride: width.into(),
+                columns: along.min(width - x),
+                rows: down.min(height - y),
+            })
+        })
+    })
+}
+
+/// Columns and rows of a tile in a grid of this height.
+fn sides(side: u16, height: u16) -> (u16, u16) {
+    let side = side.clamp(1, LARGEST_SIDE as u16);
+    if height == 1 {
+        (side * side, 1)
+    } else {
+        (side, side)
+    }
+}
+
+/// The bits of a tile that are still to be read, light after light.
+#[derive(Clone, Debug)]
+pub struct TileBits<'a> {
+    bits: Bits<'a>,
+    first_bits: u32,
+}
+
+impl TileBits<'_> {
+    /// Bits that were not read yet, with those of the tiles that follow.
+    #[must_use]
+    pub fn remaining(&self) -> usize {
+        8 * self.bits.bytes.len() + self.bits.held as usize
+    }
+
+    /// Reads the next light into the beginning of `block`; false, and nothing is written, when all
+    /// its codes are 0. Codes beyond `last` are taken as that.
+    pub fn next_light(&mut self, place: Place, last: [u16; 3], block: &mut Block) -> bool {
+        if self.bits.take(1) == 0 {
+            return false;
+        }
+        let columns = usize::from(place.columns);
+        let count = columns * usize::from(place.rows);
+        let block = block.get_mut(..count).unwrap_or_default();
+        let first_bits = self.first_bits;
+        // What is coded is kept in the block until all three are known; differences wrap.
+        for channel in [1, 0, 2] {
+            let parameter = self.bits.take(4);
+            let first = if channel == 1 {
+                self.bits.take(first_bits) as i32
+            } else {
+                unfold(self.bits.take_first())
+            };
+            decode_plane(&mut self.bits, parameter, first, block, channel, columns);
+        }
+        for codes in block {
+            let [r, g, b] = codes.map(|code| i32::from(code as i16));
+            let green = i32::from(g as u16);
+            let legal = |code: i32, last: u16| code.clamp(0, last.into()) as u16;
+            let [last_r, last_g, last_b] = last;
+            *codes = [
+                legal(green + r, last_r),
+                legal(green, last_g),
+                legal(green + b, last_b),
+            ];
+        }
+        true
+    }
+}
+
+/// One of the three coded planes.
+fn decode_plane(
+    bits: &mut Bits,
+    parameter: u32,
+    first: i32,
+    block: &mut [[u16; 3]],
+    channel: usize,
+    columns: usize,
+) {
+    let read = |block: &[[u16; 3]], at: Option<usize>| {
+        let codes = at.and_then(|at| block.get(at));
+        let code = codes.and_then(|codes| codes.get(channel)).copied();
+        signed(code.unwrap_or(0), channel)
+    };
+    for at in 0..block.len() {
+        let value = if at == 0 {
+            first
+        } else {
+            let column = at % columns.max(1);
+            let above = at.checked_sub(columns);
+            let left = (column > 0).then(|| at - 1);
+            let corner = above
+                .filter(|_| column > 0)
+                .and_then(|above| above.checked_sub(1));
+            let left = left.map(|at| read(block, Some(at)));
+            let above = above.map(|at| read(block, Some(at)));
+            let expected = predict(left, above, read(block, corner));
+            let rest = if parameter == PREDICTED {
+                0
+            } else {
+                unfold(bits.take_rice(parameter))
+            };
+            expected.wrapping_add(rest)
+        };
+        if let Some(code) = block.get_mut(at).and_then(|codes| codes.get_mut(channel)) {
+            *code = value as u16;
+        }
+    }
+}
+
+/// Green codes are whole numbers, the differences of the others signed ones.
+const fn signed(code: u16, channel: usize) -> i32 {
+    if channel == 1 {
+        code as i32
+    } else {
+        code as i16 as i32
+    }
+}
+
+/// What a value is expected to be, from its neighbours to the left, above, and above to the left.
+#[must_use]
+pub fn predict(left: Option<i32>, above: Option<i32>, corner: i32) -> i32 {
+    match (left, above) {
+        (Some(left), Some(above)) => {
+            let (low, high) = (left.min(above), left.max(above));
+            if corner >= high {
+                low
+            } else if corner <= low {
+                high
+            } else {
+                left + above - corner
+            }
+        }
+        (Some(only), None) | (None, Some(only)) => only,
+        (None, None) => 0,
+    }
+}
+
+/// `0, -1, 1, -2, 2, ...` from `0, 1, 2, 3, 4, ...`.
+const fn unfold(z: u32) -> i32 {
+    (z >> 1) as i32 ^ -((z & 1) as i32)
+}
+
+/// Bits that are still to be read, highest first; zeros follow the last.
+#[derive(Clone, Debug)]
+struct Bits<'a> {
+    bytes: core::slice::Iter<'a, u8>,
+    /// The next ones, at the top.
+    buffer: u32,
+    /// How many of them are from the bytes.
+    held: u32,
+}
+
+impl<'a> Bits<'a> {
+    fn new(bytes: &'a [u8]) -> Self {
+        Self {
+            bytes: bytes.iter(),
+            buffer: 0,
+            held: 0,
+        }
+    }
+
+    /// At least 25 bits are held afterwards.
+    fn fill(&mut self) {
+        while self.held <= 24 {
+            let byte = self.bytes.next().copied().unwrap_or(0);
+            self.buffer |= u32::from(byte) << (24 - self.held);
+            self.held += 8;
+        }
+    }
+
+    const fn skip(&mut self, count: u32) {
+        self.buffer <<= count;
+        self.held -= count;
+    }
+
+    /// The next `count` bits, at most 24.
+    fn take(&mut self, count: u32) -> u32 {
+        if count == 0 {
+            return 0;
+        }
+        self.fill();
+        let value = self.buffer >> (32 - count);
+        self.skip(count);
+        value
+    }
+
+    /// A difference with parameter `m`.
+    fn take_rice(&mut self, m: u32) -> u32 {
+        self.fill();
+        let ones = self.buffer.leading_ones();
+        if ones >= ESCAPE {
+            self.skip(ESCAPE);
+            return self.take(FULL_BITS);
+        }
+        self.skip(ones + 1);
+        ones << m | self.take(m)
+    }
+
+    /// A first difference.
+    fn take_first(&mut self) -> u32 {
+        self.fill();
+        let ones = self.buffer.leading_ones().min(ESCAPE);
+        self.skip(ones);
+        self.take(1);
+        let bits = ones + FIRST_BITS;
+        (1 << bits | self.take(bits)) - (1 << FIRST_BITS)
+    }
+}

@@ -1,0 +1,144 @@
+//! Atlas times mix: the irradiance of every element under any setting of the lights.
+//!
+//! `E_j = sum_m w_m x_m(c_jm)`, channel by channel, with the decoded value `x_m` of a code
+//! ([`Curve`](crate::code::Curve)) and the weight `w_m`, the mix. Three kernels over the same codes:
+//!
+//! * [`relight`] in `f32`, for a host;
+//! * [`relight_fixed`] in integers, for any device: every contribution is rounded to a whole number of a common unit
+//!   and `u32` sums are exact, so that a change ([`change_fixed`]) gives the bits of a full
+//!   relight, and a change and its undoing restore the same bits. Terms come from a table of all products
+//!   ([`FixedTable`]: the loop only adds) or are multiplied on the way ([`FixedMix`]), with the same bits;
+//! * [`relight_wide`] in integers of any range, which keeps the relative error that
+//!   [`Curve`](crate::code::Curve) proves for the logarithmic code.
+
+mod fixed;
+mod float;
+mod wide;
+
+use core::fmt;
+
+use crate::atlas::Atlas;
+use crate::color::Rgb;
+
+pub use fixed::{FixedMix, FixedTable, FixedWeight, Terms, change_fixed, relight_fixed};
+pub use float::{DecodeTable, relight};
+pub use wide::{Wide, WideWeight, relight_wide};
+
+/// Why a relight cannot be done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum RelightError {
+    /// A slice does not have one entry per light.
+    Lights {
+        /// How many lights the atlas has.
+        expected: u32,
+    },
+    /// A slice does not have one entry per element.
+    Elements {
+        /// How many elements the atlas has.
+        expected: u32,
+    },
+    /// A mix weight is negative or not finite.
+    Mix {
+        /// Tag of the light.
+        light: u32,
+    },
+    /// A table is too short.
+    Table {
+        /// Entries that are needed.
+        needed: usize,
+    },
+    /// The mix is too bright for the fixed-point range; start again with [`FixedMix::new`].
+    Range,
+}
+
+impl fmt::Display for RelightError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Lights { expected } => write!(f, "one entry per light is needed: {expected}"),
+            Self::Elements { expected } => {
+                write!(f, "one entry per element is needed: {expected}")
+            }
+            Self::Mix { light } => {
+                write!(f, "light {light}: the weight is negative or not finite")
+            }
+            Self::Table { needed } => write!(f, "the table needs {needed} entries"),
+            Self::Range => f.write_str("the mix is too bright for the fixed-point range"),
+        }
+    }
+}
+
+impl core::error::Error for RelightError {}
+
+/// One value for every code of every light and channel, in memory of the caller.
+#[derive(Debug)]
+struct CodeTable<'a, T> {
+    values: &'a mut [T],
+    /// Codes of a light and channel.
+    levels: usize,
+}
+
+/// Entries of a table of all codes of an atlas: lights x 3 channels x [`Atlas::levels`].
+#[must_use]
+pub fn table_length(atlas: &Atlas) -> usize {
+    atlas.light_count() as usize * 3 * atlas.levels()
+}
+
+impl<'a, T: Copy + Default> CodeTable<'a, T> {
+    fn new(atlas: &Atlas, values: &'a mut [T]) -> Result<Self, RelightError> {
+        let needed = table_length(atlas);
+        let values = values.get_mut(..needed);
+        Ok(Self {
+            values: values.ok_or(RelightError::Table { needed })?,
+            levels: atlas.levels(),
+        })
+    }
+
+    /// Fills the entries of one light with `f(channel, code)`.
+    fn fill(&mut self, light: u32, f: impl Fn(usize, u16) -> T) {
+        let length = 3 * self.levels;
+        let own = self.values.get_mut(light as usize * length..);
+        let channels = own.unwrap_or_default().chunks_mut(self.levels.max(1));
+        for (channel, values) in channels.take(3).enumerate() {
+            for (value, code) in values.iter_mut().zip(0..) {
+                *value = f(channel, code);
+            }
+        }
+    }
+
+    fn get(&self, light: u32, channel: usize, code: u16) -> T {
+        let at = (light as usize * 3 + channel) * self.levels + usize::from(code);
+        self.values.get(at).copied().unwrap_or_default()
+    }
+}
+
+fn check_mix(atlas: &Atlas, mix: &[Rgb]) -> Result<(), RelightError> {
+    check_lights(atlas, mix.len())?;
+    match mix.iter().position(|weight| !weight.is_legal()) {
+        Some(light) => Err(RelightError::Mix {
+            light: light as u32,
+        }),
+        None => Ok(()),
+    }
+}
+
+fn check_lights(atlas: &Atlas, found: usize) -> Result<(), RelightError> {
+    let expected = atlas.light_count();
+    if found == expected as usize {
+        Ok(())
+    } else {
+        Err(RelightError::Lights { expected })
+    }
+}
+
+fn check_elements(atlas: &Atlas, found: usize) -> Result<(), RelightError> {
+    let expected = atlas.element_count();
+    if found == expected as usize {
+        Ok(())
+    } else {
+        Err(RelightError::Elements { expected })
+    }
+}
+
+#[cfg(test)]
+mod tests;
