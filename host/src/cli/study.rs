@@ -1,9 +1,10 @@
 //! `relume study`.
 
 mod accuracy;
+mod estimates;
 mod paper;
-mod scale;
 mod quantization;
+mod scale;
 mod stability;
 mod table;
 
@@ -33,6 +34,8 @@ enum Name {
     Stability,
     /// The tables of the papers beside ours
     Paper,
+    /// The error that a bake estimates over the true one, for every scene of the data (reads RELUME_DATA)
+    Estimates,
     /// Time and memory over the number of elements, in a scene of 14 000 polygons (reads RELUME_DATA)
     Scale,
     /// Formats of contributions: error against number of lights and against bits
@@ -46,6 +49,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome> {
         Name::Accuracy => accuracy::run(folder)?,
         Name::Stability => stability::run(folder)?,
         Name::Paper => paper::run(folder)?,
+        Name::Estimates => estimates::run(folder)?,
         Name::Scale => scale::run(folder)?,
         Name::Quantization => quantization::run(folder)?,
     };

@@ -104,15 +104,21 @@ fn densities(mesh: &Mesh, contributions: &[Rgb]) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::OwnedMesh;
     use super::*;
     use crate::builtin::{PaperLamps, paper_room};
-    use crate::study::meshed;
+    use relume::mesh::{Spacing, subdivide};
 
     #[test]
     fn places_lie_inside_their_elements_and_stand_for_all_of_the_area() {
         let room = paper_room(PaperLamps::One).unwrap();
-        let meshed = meshed(&room, 1.0, 0.25);
-        let mesh = meshed.mesh().view();
+        let spacing = Spacing {
+            patch: 1.0,
+            element: 0.25,
+        };
+        let mut mesh = OwnedMesh::default();
+        subdivide(&room.scene.view().unwrap(), spacing, |_, _| true, &mut mesh).unwrap();
+        let mesh = mesh.view();
         // Nine tenths of the light in one element.
         let mut light = vec![Rgb::WHITE; mesh.elements.len()];
         light[100] = Rgb::WHITE * (9.0 * light.len() as f32);

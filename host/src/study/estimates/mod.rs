@@ -7,6 +7,7 @@
 use glam::DVec3;
 
 use super::truth::{Truth, TruthError, traced};
+use crate::chart::{Chart, Series, Style, Vertical};
 use crate::mesh::spread;
 use crate::reference::path_trace::Receiver;
 use crate::scene::OwnedScene;
@@ -24,17 +25,15 @@ pub struct Estimated {
     pub estimate: f64,
     /// Relative L1 error.
     pub error: f64,
+    /// Noise of the truth, relative as well.
+    pub noise: f64,
 }
 
 impl Estimated {
-    /// Estimate over truth; 1 where both are nothing.
+    /// Estimate over truth; nothing where the error drowns in the noise of the truth.
     #[must_use]
-    pub fn ratio(&self) -> f64 {
-        if self.error > 0.0 {
-            self.estimate / self.error
-        } else {
-            1.0
-        }
+    pub fn ratio(&self) -> Option<f64> {
+        (self.error > self.noise).then(|| self.estimate / self.error)
     }
 }
 
@@ -76,12 +75,36 @@ pub fn compare(
     });
     let estimated = solution.lights.iter().zip(errors);
     Ok(estimated
-        .map(|(light, error)| Estimated {
+        .map(|(light, [error, noise])| Estimated {
             light: light.name.clone(),
             estimate: light.error.into(),
             error,
+            noise,
         })
         .collect())
+}
+
+/// Smallest, median and largest of the ratios of lights, if there are any.
+#[must_use]
+pub fn spread_of_ratios(lights: &[Estimated]) -> Option<[f64; 3]> {
+    let mut ratios: Vec<f64> = lights.iter().filter_map(Estimated::ratio).collect();
+    ratios.sort_by(f64::total_cmp);
+    Some([*ratios.first()?, ratios[ratios.len() / 2], *ratios.last()?])
+}
+
+/// Estimate over error of every light, scene by scene, from the first at the top.
+#[must_use]
+pub fn chart(scenes: &[(&str, Vec<Estimated>)]) -> Chart {
+    let points = scenes.iter().enumerate().flat_map(|(number, (_, lights))| {
+        let ratios = lights.iter().filter_map(Estimated::ratio);
+        ratios.map(move |ratio| (ratio, number as f64))
+    });
+    Chart {
+        title: "how true the estimated errors are".to_owned(),
+        x: "estimated over true relative L1 error of a light".to_owned(),
+        y: Vertical::Names(scenes.iter().map(|(name, _)| (*name).to_owned()).collect()),
+        series: vec![Series::new("a light", Style::Dots, points)],
+    }
 }
 
 #[cfg(test)]
@@ -109,6 +132,7 @@ mod tests {
             exact[0].estimate < 1e-3 && exact[0].error < 0.015,
             "{exact:?}"
         );
+        assert_eq!(exact[0].ratio(), None);
         for value in &mut solution.contributions {
             *value = *value * 0.5;
         }
