@@ -280,6 +280,15 @@ impl<'a> Meshed<'a> {
         settings: &Settings,
         watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<(Solution, Hits), BakeError> {
+        let baked = self.bake(settings, watch)?;
+        Ok((baked.solution, baked.hits))
+    }
+
+    fn bake(
+        &self,
+        settings: &Settings,
+        watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<Baked, BakeError> {
         let view = self.view()?;
         let parallel = |mesh: &Mesh| Parallel::new(mesh, &self.bvh);
         let (surfaces, bodies) = (view.surfaces(), self.bvh.bodies());
@@ -303,7 +312,7 @@ impl<'a> Meshed<'a> {
         watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<Solution, BakeError> {
         let rows = |job: &mut Job, mesh| without_hits(shoot::refine(job, mesh, filler));
-        Ok(self.run(settings, watch, rows)?.0)
+        Ok(self.run(settings, watch, rows)?.solution)
     }
 
     fn run(
@@ -311,7 +320,7 @@ impl<'a> Meshed<'a> {
         settings: &Settings,
         watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
         solve: impl FnOnce(&mut Job, OwnedMesh) -> Result<(Solved, Hits), BakeError>,
-    ) -> Result<(Solution, Hits), BakeError> {
+    ) -> Result<Baked, BakeError> {
         let lights = &self.scene.lights;
         check_memory(&self.mesh, lights.len(), settings)?;
         let mut job = Job {
@@ -321,9 +330,24 @@ impl<'a> Meshed<'a> {
             watch,
         };
         let (solved, hits) = solve(&mut job, self.mesh.clone())?;
-        let solution = solution(self.scene, settings.method, self.spacing, solved);
-        Ok((solution, hits))
+        let seen = estimate::errors(job.scene, &solved.mesh, &self.bvh, &solved.contributions);
+        let of_mesh = seen.iter().zip(&solved.errors);
+        let of_mesh = of_mesh.map(|(seen, left)| (seen * seen - left * left).max(0.0).sqrt());
+        Ok(Baked {
+            of_mesh: of_mesh.fold(0.0, f32::max),
+            solution: solution(self.scene, settings.method, self.spacing, solved, &seen),
+            hits,
+        })
     }
+}
+
+/// What a bake returns.
+struct Baked {
+    solution: Solution,
+    /// Where rays ended, if there were any.
+    hits: Hits,
+    /// Estimated relative L1 error of the worst light that is left to the length of the elements.
+    of_mesh: f32,
 }
 
 /// Rows leave no rays behind.
@@ -384,11 +408,16 @@ fn check_memory(mesh: &OwnedMesh, lights: usize, settings: &Settings) -> Result<
     Ok(())
 }
 
-fn solution(scene: &OwnedScene, method: Method, spacing: Spacing, solved: Solved) -> Solution {
-    let count = scene.lights.len();
-    let mesh_errors = estimate::mesh_errors(&solved.mesh, &solved.contributions, count);
-    let errors = solved.errors.iter().zip(mesh_errors);
-    let errors = errors.map(|(sampling, mesh)| sampling.hypot(mesh));
+/// `seen` are the errors that places see, which know nothing of light that has not been distributed.
+fn solution(
+    scene: &OwnedScene,
+    method: Method,
+    spacing: Spacing,
+    solved: Solved,
+    seen: &[f32],
+) -> Solution {
+    let errors = solved.errors.iter().zip(seen);
+    let errors = errors.map(|(left, seen)| left.max(*seen));
     let lights = scene.lights.iter().zip(solved.residuals).zip(errors);
     Solution {
         surfaces: scene.surfaces.iter().map(|s| *s.polygon()).collect(),
