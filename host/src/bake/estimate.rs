@@ -20,7 +20,7 @@ use relume::scene::Scene;
 
 use super::direct::{self, Lamps};
 use crate::bvh::Bvh;
-use crate::gather::Rays;
+use crate::gather::{Fan, Rays};
 use crate::mesh::{Locator, OwnedMesh, Place, spread};
 use crate::rows::{Parallel, RowFiller};
 
@@ -138,13 +138,14 @@ fn gathered_light(
     let view = mesh.view();
     let locator = Locator::new(view);
     let rays = Rays::new(view, &locator, bvh);
+    let fan = Fan::new(RAYS);
     let mut light = vec![[Rgb::BLACK; 2]; places.len() * lights];
     let of_places = light.par_chunks_mut(lights).zip(places);
     of_places.enumerate().for_each(|(seed, (light, place))| {
         let Some(polygon) = view.element_polygon(&place.part) else {
             return;
         };
-        let ends = rays.from_point(&polygon, polygon.center(), seed as u64, RAYS);
+        let ends = rays.from_point(&polygon, polygon.center(), seed as u64, &fan);
         for (half, end) in [0, 1].into_iter().cycle().zip(ends) {
             let Some(element) = end.map(|end| end.element as usize) else {
                 continue;
