@@ -70,6 +70,11 @@ pub struct Place {
 }
 
 impl Place {
+    /// How many elements it has.
+    pub(crate) const fn len(self) -> usize {
+        self.columns as usize * self.rows as usize
+    }
+
     /// Its elements, row by row.
     pub fn elements(self) -> impl Iterator<Item = u32> {
         let row = move |row: u32| self.first + row * self.stride;

@@ -269,10 +269,10 @@ impl<'a, F: Form> Sums<'a, F> {
         })
     }
 
-    /// Sets the levels of one light, corrects the sums for it, and shows them.
+    /// Sets the levels of one light, corrects the sums for it, and shows them: [`Self::set`] and [`Self::apply`].
     ///
     /// # Errors
-    /// Slices and runs that do not fit the atlas, or no such light. Nothing has changed then, but the pixels.
+    /// Slices and runs that do not fit the atlas, or no such light. Nothing has changed then.
     pub fn change<const K: usize, T: Encode>(
         &mut self,
         atlas: &Atlas,
@@ -283,11 +283,41 @@ impl<'a, F: Form> Sums<'a, F> {
     ) -> Result<(), RelightError> {
         check_elements(atlas, pixels.len())?;
         finish.check(pixels.len())?;
-        let mut rows = rows::<F, K>(atlas)?;
+        rows::<F, K>(atlas)?;
+        self.set(atlas, mix, (light, levels))?;
+        self.apply::<K, T>(atlas, light, finish, pixels)
+    }
+
+    /// Sets the levels of one light, and multiplies out by how much it changes; [`Self::apply`] must follow.
+    ///
+    /// # Errors
+    /// [`RelightError::Lights`] without such a light. Nothing has changed then.
+    pub fn set(
+        &mut self,
+        atlas: &Atlas,
+        mix: &mut FrameMix,
+        (light, levels): (u32, [u16; 3]),
+    ) -> Result<(), RelightError> {
         let before = mix.terms(atlas, light, F::BITS)?;
         mix.set(light, levels);
         let after = mix.terms(atlas, light, F::BITS)?;
         F::fill(self.table, &before, &after);
+        Ok(())
+    }
+
+    /// Corrects the sums for the light that was set, and shows them.
+    ///
+    /// # Errors
+    /// Slices and runs that do not fit the atlas. Nothing has changed then.
+    pub fn apply<const K: usize, T: Encode>(
+        &mut self,
+        atlas: &Atlas,
+        light: u32,
+        finish: &Finish<T>,
+        pixels: &mut [T::Pixel],
+    ) -> Result<(), RelightError> {
+        check_elements(atlas, pixels.len())?;
+        let mut rows = rows::<F, K>(atlas)?;
         let (light, table, mut sums) = (light as usize, &*self.table, &mut *self.sums);
         finish.by_run(pixels, |pixels, factors| {
             let own = rows.split_off(..pixels.len()).unwrap_or_default();
