@@ -17,7 +17,7 @@ use core::num::NonZeroUsize;
 
 use super::{RelightError, Wide, check_lights};
 use crate::atlas::{Atlas, AtlasLight, Block, LARGEST_SIDE, Tiles};
-use crate::code::{Curve, Magnitude, Scale};
+use crate::code::{Curve, DECODED_BITS, Magnitude, Scale, decode_fixed};
 use crate::color::Rgb;
 
 /// Linear steps from black up that a display encodes.
@@ -26,8 +26,11 @@ pub const STEPS: u32 = 2048;
 /// Bits of a value, a level, a gain, a reflectance.
 const BITS: i32 = 16;
 
+/// Where the values of the exponential code have 16 bits already.
+const EXPONENTIAL: i32 = -(DECODED_BITS as i32);
+
 /// Elements that are looked at together.
-const CHUNK: usize = 32;
+const CHUNK: usize = 16;
 
 /// The fewest bits of a sum.
 pub(super) const FEWEST_BITS: u32 = 10;
@@ -121,7 +124,16 @@ impl Values {
     }
 
     /// Below 2^16.
+    #[inline(always)]
     pub(super) fn of(&self, code: u16) -> u32 {
+        if matches!(self.curve, Curve::Exponential { .. }) && self.exponent == EXPONENTIAL {
+            return decode_fixed(code.min(self.last) as u8).into();
+        }
+        self.of_any(code)
+    }
+
+    #[inline(never)]
+    fn of_any(&self, code: u16) -> u32 {
         let value = self.curve.magnitude(code.min(self.last));
         let shift = self.exponent - value.exponent;
         let distance = shift.unsigned_abs();

@@ -42,7 +42,12 @@ pub trait Form {
     fn codes<'a>(atlas: &Atlas<'a>) -> Option<&'a [Self::Codes]>;
 
     /// Fills one light of a table with the difference of what two weights make of every code.
-    fn fill<const L: usize>(table: &mut Self::Table<L>, light: usize, before: &Terms, after: &Terms);
+    fn fill<const L: usize>(
+        table: &mut Self::Table<L>,
+        light: usize,
+        before: Option<&Terms>,
+        after: &Terms,
+    );
 
     /// A sum, and what a table says of a light's codes.
     #[must_use]
@@ -50,7 +55,7 @@ pub trait Form {
         sum: Self::Sum,
         table: &Self::Table<L>,
         light: usize,
-        codes: Self::Codes,
+        codes: &Self::Codes,
     ) -> Self::Sum;
 
     /// What is shown of a sum.
@@ -77,7 +82,7 @@ impl Form for Lum {
     fn fill<const L: usize>(
         table: &mut [[u32; L]; 256],
         light: usize,
-        before: &Terms,
+        before: Option<&Terms>,
         after: &Terms,
     ) {
         let pack = |[(r, values), (g, _), (b, _)]: &Terms, code| {
@@ -86,13 +91,14 @@ impl Form for Lum {
         };
         let own = table.iter_mut().filter_map(|lights| lights.get_mut(light));
         for (entry, code) in own.zip(0..) {
-            *entry = pack(after, code).wrapping_sub(pack(before, code));
+            let before = before.map_or(0, |before| pack(before, code));
+            *entry = pack(after, code).wrapping_sub(before);
         }
     }
 
     #[inline(always)]
-    fn add<const L: usize>(sum: u32, table: &[[u32; L]; 256], light: usize, code: u8) -> u32 {
-        sum.wrapping_add(entry(table, light, code))
+    fn add<const L: usize>(sum: u32, table: &[[u32; L]; 256], light: usize, code: &u8) -> u32 {
+        sum.wrapping_add(entry(table, light, *code))
     }
 
     #[inline(always)]
@@ -126,15 +132,16 @@ impl Form for Colour {
     fn fill<const L: usize>(
         tables: &mut [[[u16; L]; 256]; 3],
         light: usize,
-        before: &Terms,
+        before: Option<&Terms>,
         after: &Terms,
     ) {
-        for ((table, before), after) in tables.iter_mut().zip(before).zip(after) {
-            let (weight, values) = after;
+        for ((table, (weight, values)), channel) in tables.iter_mut().zip(after).zip(0..) {
+            let before = before.and_then(|before| before.get(channel));
+            let before = before.map_or(Weight::ZERO, |(weight, _)| *weight);
             let own = table.iter_mut().filter_map(|lights| lights.get_mut(light));
             for (entry, code) in own.zip(0..) {
                 let value = values.of(code);
-                *entry = weight.of(value).wrapping_sub(before.0.of(value)) as u16;
+                *entry = weight.of(value).wrapping_sub(before.of(value)) as u16;
             }
         }
     }
@@ -144,20 +151,20 @@ impl Form for Colour {
         sum: [u16; 3],
         tables: &[[[u16; L]; 256]; 3],
         light: usize,
-        codes: [u8; 3],
+        [code_r, code_g, code_b]: &[u8; 3],
     ) -> [u16; 3] {
         let ([r, g, b], [red, green, blue]) = (sum, tables);
-        let [code_r, code_g, code_b] = codes;
         [
-            r.wrapping_add(entry(red, light, code_r)),
-            g.wrapping_add(entry(green, light, code_g)),
-            b.wrapping_add(entry(blue, light, code_b)),
+            r.wrapping_add(entry(red, light, *code_r)),
+            g.wrapping_add(entry(green, light, *code_g)),
+            b.wrapping_add(entry(blue, light, *code_b)),
         ]
     }
 
     #[inline(always)]
     fn steps(sum: [u16; 3], factors: [u16; 3]) -> [u32; 3] {
-        let ([r, g, b], [factor_r, factor_g, factor_b]) = (sum.map(u32::from), factors.map(u32::from));
+        let ([r, g, b], [factor_r, factor_g, factor_b]) =
+            (sum.map(u32::from), factors.map(u32::from));
         [
             (r * factor_r) >> 21,
             (g * factor_g) >> 21,
@@ -185,8 +192,7 @@ pub fn fill_table<F: Form, const L: usize>(
     table: &mut F::Table<L>,
 ) -> Result<(), RelightError> {
     let after = mix.terms(atlas, light, F::BITS)?;
-    let before = after.map(|(_, values)| (Weight::ZERO, values));
-    F::fill(table, light as usize, &before, &after);
+    F::fill(table, light as usize, None, &after);
     Ok(())
 }
 
@@ -220,14 +226,25 @@ fn full_run<F: Form, const K: usize, const L: usize, T: Encode>(
     tone: &T,
     pixels: &mut [T::Pixel],
 ) {
-    for (row, pixel) in rows.iter().zip(pixels) {
-        let mut sum = F::Sum::default();
-        for (light, codes) in row.iter().enumerate() {
-            sum = F::add(sum, table, light, *codes);
-        }
-        *pixel = tone.encode(F::steps(sum, factors));
+    let (pairs, last) = rows.as_chunks::<2>();
+    let (pixel_pairs, last_pixel) = pixels.as_chunks_mut::<2>();
+    for (rows, pixels) in pairs.iter().zip(pixel_pairs) {
+        let sums = rows.each_ref().map(|row| sum_of::<F, K, L>(row, table));
+        *pixels = sums.map(|sum| tone.encode(F::steps(sum, factors)));
         as_it_is();
     }
+    for (row, pixel) in last.iter().zip(last_pixel) {
+        *pixel = tone.encode(F::steps(sum_of::<F, K, L>(row, table), factors));
+    }
+}
+
+#[inline(always)]
+fn sum_of<F: Form, const K: usize, const L: usize>(row: &[F::Codes; K], table: &F::Table<L>) -> F::Sum {
+    let mut sum = F::Sum::default();
+    for (light, codes) in row.iter().enumerate() {
+        sum = F::add(sum, table, light, codes);
+    }
+    sum
 }
 
 /// The pixels of some sums.
@@ -236,6 +253,24 @@ fn show<F: Form, T: Encode>(sums: &[F::Sum], factors: [u16; 3], tone: &T, pixels
     for (pixel, sum) in pixels.iter_mut().zip(sums) {
         *pixel = tone.encode(F::steps(*sum, factors));
         as_it_is();
+    }
+}
+
+/// Adds one light to the sums of some elements.
+#[inline(never)]
+fn add_light<F: Form, const K: usize>(
+    rows: &[[F::Codes; K]],
+    light: usize,
+    table: &F::Table<1>,
+    sums: &mut [F::Sum],
+) {
+    if light >= K {
+        return;
+    }
+    for (sum, row) in sums.iter_mut().zip(rows) {
+        if let Some(codes) = row.get(light) {
+            *sum = F::add(*sum, table, 0, codes);
+        }
     }
 }
 
@@ -269,13 +304,8 @@ impl<'a, F: Form> Sums<'a, F> {
         sums.fill(F::Sum::default());
         for light in 0..K {
             let after = mix.terms(atlas, light as u32, F::BITS)?;
-            let before = after.map(|(_, values)| (Weight::ZERO, values));
-            F::fill(table, 0, &before, &after);
-            for (sum, row) in sums.iter_mut().zip(rows) {
-                if let Some(codes) = row.get(light) {
-                    *sum = F::add(*sum, table, 0, *codes);
-                }
-            }
+            F::fill(table, 0, None, &after);
+            add_light::<F, K>(rows, light, table, sums);
         }
         Ok(Self { sums, table })
     }
@@ -328,7 +358,7 @@ impl<'a, F: Form> Sums<'a, F> {
         let before = mix.terms(atlas, light, F::BITS)?;
         mix.set(light, levels);
         let after = mix.terms(atlas, light, F::BITS)?;
-        F::fill(self.table, 0, &before, &after);
+        F::fill(self.table, 0, Some(&before), &after);
         Ok(())
     }
 
@@ -349,13 +379,8 @@ impl<'a, F: Form> Sums<'a, F> {
         finish.by_run(pixels, |pixels, factors| {
             let own = rows.split_off(..pixels.len()).unwrap_or_default();
             let sums = sums.split_off_mut(..pixels.len()).unwrap_or_default();
-            for ((sum, pixel), row) in sums.iter_mut().zip(pixels).zip(own) {
-                if let Some(codes) = row.get(light) {
-                    *sum = F::add(*sum, table, 0, *codes);
-                }
-                *pixel = finish.tone.encode(F::steps(*sum, factors));
-                as_it_is();
-            }
+            add_light::<F, K>(own, light, table, sums);
+            show::<F, T>(sums, factors, finish.tone, pixels);
         })
     }
 }
