@@ -1,13 +1,14 @@
 //! The solver on microcontrollers, in an emulator: the same pixels as here, in so many instructions.
 
-mod bake;
 mod inputs;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use std::{env, fs};
+use std::{env, fs, iter};
 
 use inputs::{Input, hash, inputs, write_if_new};
+use relume::atlas::Atlas;
+use relume_host::device_cost::{Core, DeviceCost};
 use serde_json::{Value, json};
 
 /// The images of `tests/firmware`: the binary, its kernel, its input.
@@ -264,6 +265,7 @@ fn images_give_the_pixels_of_the_host_within_their_budgets() {
         }
     }
     check_budgets(&rows);
+    check_predictions(&rows, &inputs);
     no_float_on_the_small_core();
     one_index_does_not_link();
 }
@@ -293,6 +295,37 @@ fn check_budgets(rows: &[Value]) {
         }
     }
     assert!(exceeded.is_empty(), "{}", exceeded.join("\n"));
+}
+
+/// What `relume info` predicts of frames is within 10 % of what was counted.
+fn check_predictions(rows: &[Value], inputs: &[Input]) {
+    let cores = iter::zip(TARGETS, Core::ALL);
+    for row in rows {
+        let core = cores.clone().find(|(target, _)| row["target"] == *target);
+        let image = IMAGES.iter().find(|image| row["image"] == image.0);
+        let (Some((_, core)), Some((image, kernel, name))) = (core, image) else {
+            continue;
+        };
+        if kernel.starts_with("change") {
+            continue;
+        }
+        let input = inputs.iter().find(|input| input.name == *name);
+        let bytes = &input.expect("an input").atlas;
+        let atlas = Atlas::parse(bytes).expect("an atlas");
+        let cost = DeviceCost::new(&atlas, bytes.len(), core);
+        for (predicted, key) in [
+            (cost.flash, "flash"),
+            (cost.ram, "ram"),
+            (cost.frame, "per_frame_warm"),
+        ] {
+            let counted = row[key].as_f64().expect("a number");
+            let off = (predicted as f64 / counted - 1.0).abs();
+            assert!(
+                off <= 0.1,
+                "{image}, {core:?}, {key}: {predicted} for {counted}"
+            );
+        }
+    }
 }
 
 /// Names of soft-float routines: `__aeabi_fadd`, `__mulsf3`, `__floatsidf` and so on.

@@ -7,7 +7,7 @@
 
 use relume::atlas::Atlas;
 use relume::code::Code;
-use relume::relight::{FrameLight, table_length};
+use relume::relight::table_length;
 
 /// A core that the solver was counted on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,7 +42,7 @@ pub struct DeviceCost {
     pub flash: u64,
     /// Bytes of RAM: tables, pixels and the stack.
     pub ram: u64,
-    /// Instructions of a frame, all lights changed or not, with tables kept where there is room for them.
+    /// Instructions of a frame with tables kept, where there is room for them.
     pub frame: u64,
 }
 
@@ -53,7 +53,10 @@ impl DeviceCost {
     /// Of an atlas of so many bytes.
     #[must_use]
     pub fn new(atlas: &Atlas, bytes: usize, core: Core) -> Self {
-        let (n, k) = (f64::from(atlas.element_count()), f64::from(atlas.light_count()));
+        let (n, k) = (
+            f64::from(atlas.element_count()),
+            f64::from(atlas.light_count()),
+        );
         let lanes = u64::from(atlas.light_count().next_power_of_two());
         let is_lum = atlas.is_all_in(|code| code == Code::Lum8);
         let is_colour = atlas.is_all_in(|code| code.bytes() == 3);
@@ -67,10 +70,9 @@ impl DeviceCost {
         } else {
             (any(core), 2 * table_length(atlas) as u64 + 6 * elements)
         };
-        let lights = u64::from(atlas.light_count()) * size_of::<FrameLight>() as u64;
         Self {
             flash: bytes as u64 + model.code,
-            ram: table + 2 * elements + lights + model.stack,
+            ram: table + 2 * elements + model.stack,
             frame: (n * (model.element + model.code_of_light * k) + model.light * k) as u64,
         }
     }
@@ -88,4 +90,58 @@ struct Model {
     code: u64,
     /// Bytes of stack.
     stack: u64,
+}
+
+const fn lum(core: Core) -> Model {
+    let (element, code_of_light, code) = match core {
+        Core::M0 => (35.1, 5.0, 37_000),
+        Core::M3 => (24.6, 4.03, 36_500),
+        Core::M4F => (26.0, 3.98, 36_700),
+    };
+    Model {
+        element,
+        code_of_light,
+        light: 0.0,
+        code,
+        stack: 1_900,
+    }
+}
+
+/// On the M0, a table filled for every light of every frame.
+const LUM_IN_BATCHES: Model = Model {
+    element: 30.0,
+    code_of_light: 7.05,
+    light: 13_200.0,
+    code: 39_000,
+    stack: 2_500,
+};
+
+const fn colour(core: Core) -> Model {
+    let (element, code_of_light, code) = match core {
+        Core::M0 => (27.5, 15.5, 37_300),
+        Core::M3 => (18.4, 12.6, 34_900),
+        Core::M4F => (17.4, 12.6, 36_700),
+    };
+    Model {
+        element,
+        code_of_light,
+        light: 0.0,
+        code,
+        stack: 1_900,
+    }
+}
+
+const fn any(core: Core) -> Model {
+    let (code_of_light, code) = match core {
+        Core::M0 => (900.0, 40_000),
+        Core::M3 => (455.0, 39_000),
+        Core::M4F => (440.0, 39_000),
+    };
+    Model {
+        element: 25.0,
+        code_of_light,
+        light: 0.0,
+        code,
+        stack: 6_400,
+    }
 }

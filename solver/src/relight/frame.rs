@@ -17,7 +17,7 @@ use core::num::NonZeroUsize;
 
 use super::{RelightError, Wide, check_lights};
 use crate::atlas::{Atlas, AtlasLight, Block, LARGEST_SIDE, Tiles};
-use crate::code::{Curve, DECODED_BITS, Magnitude, Scale, decode_fixed};
+use crate::code::{Curve, DECODED, DECODED_BITS, Magnitude, Scale};
 use crate::color::Rgb;
 
 /// Linear steps from black up that a display encodes.
@@ -123,17 +123,26 @@ impl Values {
         }
     }
 
-    /// Below 2^16.
+    /// Calls `f` with one entry and value after the other, from code 0 on.
     #[inline(always)]
-    pub(super) fn of(&self, code: u16) -> u32 {
+    pub(super) fn with_codes<E>(
+        &self,
+        entries: impl Iterator<Item = E>,
+        mut f: impl FnMut(E, u32),
+    ) {
         if matches!(self.curve, Curve::Exponential { .. }) && self.exponent == EXPONENTIAL {
-            return decode_fixed(code.min(self.last) as u8).into();
+            for (entry, value) in entries.zip(&DECODED) {
+                f(entry, u32::from(*value));
+            }
+        } else {
+            for (entry, code) in entries.zip(0..) {
+                f(entry, self.of(code));
+            }
         }
-        self.of_any(code)
     }
 
-    #[inline(never)]
-    fn of_any(&self, code: u16) -> u32 {
+    /// Below 2^16.
+    pub(super) fn of(&self, code: u16) -> u32 {
         let value = self.curve.magnitude(code.min(self.last));
         let shift = self.exponent - value.exponent;
         let distance = shift.unsigned_abs();
@@ -322,9 +331,9 @@ impl<'a> FrameMix<'a> {
     ) -> Result<Terms, RelightError> {
         let expected = atlas.light_count();
         let entry = self.lights.get(light as usize);
-        let found = entry.zip(atlas.lights().nth(light as usize));
-        let (entry, light) = found.ok_or(RelightError::Lights { expected })?;
-        Ok(entry.terms(&light, bits))
+        let found = entry.zip(atlas.curves(light));
+        let (entry, (curves, last)) = found.ok_or(RelightError::Lights { expected })?;
+        Ok(entry.terms(curves, last, bits))
     }
 }
 
@@ -332,8 +341,8 @@ impl<'a> FrameMix<'a> {
 pub type Terms = [(Weight, Values); 3];
 
 impl FrameLight {
-    fn terms(&self, light: &AtlasLight, bits: [u32; 3]) -> Terms {
-        let ([r, g, b], [last_r, last_g, last_b]) = (light.curves, light.last);
+    fn terms(&self, curves: [Curve; 3], last: [u16; 3], bits: [u32; 3]) -> Terms {
+        let ([r, g, b], [last_r, last_g, last_b]) = (curves, last);
         let ([gain_r, gain_g, gain_b], [level_r, level_g, level_b]) = (self.gains, self.levels);
         let [bits_r, bits_g, bits_b] = bits;
         [
@@ -349,7 +358,7 @@ impl FrameLight {
             levels: [u16::MAX; 3],
             ..*self
         };
-        full.terms(light, [BITS as u32; 3])
+        full.terms(light.curves, light.last, [BITS as u32; 3])
     }
 }
 

@@ -85,15 +85,21 @@ impl Form for Lum {
         before: Option<&Terms>,
         after: &Terms,
     ) {
-        let pack = |[(r, values), (g, _), (b, _)]: &Terms, code| {
-            let value = values.of(code);
+        let [(r, values), (g, _), (b, _)] = after;
+        let [old_r, old_g, old_b] = weights(before);
+        let pack = |r: Weight, g: Weight, b: Weight, value| {
             r.of(value) << 22 | g.of(value) << 10 | b.of(value)
         };
+        let is_new = before.is_none();
         let own = table.iter_mut().filter_map(|lights| lights.get_mut(light));
-        for (entry, code) in own.zip(0..) {
-            let before = before.map_or(0, |before| pack(before, code));
-            *entry = pack(after, code).wrapping_sub(before);
-        }
+        values.with_codes(own, |entry, value| {
+            let old = if is_new {
+                0
+            } else {
+                pack(old_r, old_g, old_b, value)
+            };
+            *entry = pack(*r, *g, *b, value).wrapping_sub(old);
+        });
     }
 
     #[inline(always)]
@@ -135,14 +141,12 @@ impl Form for Colour {
         before: Option<&Terms>,
         after: &Terms,
     ) {
-        for ((table, (weight, values)), channel) in tables.iter_mut().zip(after).zip(0..) {
-            let before = before.and_then(|before| before.get(channel));
-            let before = before.map_or(Weight::ZERO, |(weight, _)| *weight);
+        let channels = tables.iter_mut().zip(after).zip(weights(before));
+        for ((table, (weight, values)), old) in channels {
             let own = table.iter_mut().filter_map(|lights| lights.get_mut(light));
-            for (entry, code) in own.zip(0..) {
-                let value = values.of(code);
-                *entry = weight.of(value).wrapping_sub(before.of(value)) as u16;
-            }
+            values.with_codes(own, |entry, value| {
+                *entry = weight.of(value).wrapping_sub(old.of(value)) as u16;
+            });
         }
     }
 
@@ -179,6 +183,11 @@ fn entry<V: Copy + Default, const L: usize>(table: &[[V; L]; 256], light: usize,
     #[allow(clippy::indexing_slicing)]
     let lights = &table[usize::from(code)];
     lights.get(light).copied().unwrap_or_default()
+}
+
+/// The weights of some terms, or of nothing.
+fn weights(terms: Option<&Terms>) -> [Weight; 3] {
+    terms.map_or([Weight::ZERO; 3], |terms| terms.map(|(weight, _)| weight))
 }
 
 /// Multiplies out one light of a mix.
@@ -226,25 +235,14 @@ fn full_run<F: Form, const K: usize, const L: usize, T: Encode>(
     tone: &T,
     pixels: &mut [T::Pixel],
 ) {
-    let (pairs, last) = rows.as_chunks::<2>();
-    let (pixel_pairs, last_pixel) = pixels.as_chunks_mut::<2>();
-    for (rows, pixels) in pairs.iter().zip(pixel_pairs) {
-        let sums = rows.each_ref().map(|row| sum_of::<F, K, L>(row, table));
-        *pixels = sums.map(|sum| tone.encode(F::steps(sum, factors)));
+    for (row, pixel) in rows.iter().zip(pixels) {
+        let mut sum = F::Sum::default();
+        for (light, codes) in row.iter().enumerate() {
+            sum = F::add(sum, table, light, codes);
+        }
+        *pixel = tone.encode(F::steps(sum, factors));
         as_it_is();
     }
-    for (row, pixel) in last.iter().zip(last_pixel) {
-        *pixel = tone.encode(F::steps(sum_of::<F, K, L>(row, table), factors));
-    }
-}
-
-#[inline(always)]
-fn sum_of<F: Form, const K: usize, const L: usize>(row: &[F::Codes; K], table: &F::Table<L>) -> F::Sum {
-    let mut sum = F::Sum::default();
-    for (light, codes) in row.iter().enumerate() {
-        sum = F::add(sum, table, light, codes);
-    }
-    sum
 }
 
 /// The pixels of some sums.
