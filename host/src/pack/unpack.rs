@@ -10,9 +10,15 @@ use thiserror::Error;
 use crate::mesh::OwnedMesh;
 use crate::solution::{Method, Solution, SolutionLight};
 
-/// An atlas is larger than memory once it is unpacked: dark tiles take next to no bytes.
+/// Most contributions that are unpacked: 3 GiB of them. Dark tiles take next to no bytes, so that a small file may
+/// promise any number.
+const MOST: usize = 1 << 28;
+
+/// An atlas is larger than memory once it is unpacked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-#[error("{elements} elements times {lights} lights are more than memory holds; pack fewer of them")]
+#[error(
+    "{elements} elements times {lights} lights are more than the {MOST} contributions that are unpacked; pack fewer of them"
+)]
 pub struct TooLarge {
     /// How many elements the atlas has.
     pub elements: u32,
@@ -31,6 +37,7 @@ pub fn contributions(atlas: &Atlas) -> Result<Vec<Rgb>, TooLarge> {
         lights: atlas.light_count(),
     };
     let count = lights.checked_mul(atlas.element_count() as usize);
+    let count = count.filter(|count| *count <= MOST);
     let contributions = count.and_then(|count| filled(count, Rgb::BLACK));
     let mut contributions = contributions.ok_or(too_large)?;
     let mut values = filled(table_length(atlas), 0.0).ok_or(too_large)?;
@@ -164,7 +171,7 @@ mod tests {
             contributions(&Atlas::parse(&bytes).unwrap())
         };
         assert_eq!(with(1), Ok(vec![Rgb::BLACK; 1 << 20]));
-        let (elements, lights) = (1 << 20, 1 << 20);
+        let (elements, lights) = (1 << 20, 257);
         let refused = with(lights as usize).unwrap_err();
         assert_eq!(refused, TooLarge { elements, lights });
     }

@@ -38,6 +38,10 @@ impl<'a> Atlas<'a> {
     pub fn parse(bytes: &'a [u8]) -> Result<Self, AtlasError> {
         let header = Header::parse(bytes)?;
         let counts = header.counts;
+        // Else any number of elements would fit into a file of no size.
+        if counts.lights == 0 {
+            return Err(AtlasError::Illegal("number of lights"));
+        }
         let lights = u64::from(counts.lights) * LIGHT_BYTES as u64 + HEADER_BYTES as u64;
         if (bytes.len() as u64) < lights {
             return Err(AtlasError::Truncated { needed: lights });

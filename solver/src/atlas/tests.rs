@@ -234,6 +234,7 @@ fn what_the_format_does_not_allow_is_an_error() {
         (13, &[1], "reserved byte"),
         (14, &[4], "image width"),
         (16, &[0], "length"),
+        (28, &[0; 4], "number of lights"),
         (48, &nan, "error"),
         (48, &minus, "error"),
         (52, &[0xff; 4], "error"),
@@ -311,6 +312,21 @@ proptest! {
     fn noise_never_panics(bytes in proptest::collection::vec(any::<u8>(), 0..400)) {
         prop_assert!(Atlas::parse(&bytes).is_err());
     }
+}
+
+#[test]
+fn elements_without_a_light_are_no_atlas() {
+    let contents = Contents {
+        quantity: Quantity::Irradiance,
+        lights: &[],
+        elements: u32::MAX,
+        image_width: 0,
+        errors: None,
+        tiles: &[],
+        mesh: None,
+    };
+    let refused = Err(AtlasError::Unfit("elements without a light"));
+    assert_eq!(size(&contents), refused);
 }
 
 #[test]

@@ -70,6 +70,9 @@ impl Contents<'_> {
         {
             return Err(AtlasError::Unfit("another mesh than that of its elements"));
         }
+        if self.lights.is_empty() {
+            return Err(AtlasError::Unfit("elements without a light"));
+        }
         let width = u32::from(self.image_width);
         if width > 0 && (self.mesh.is_some() || !self.elements.is_multiple_of(width)) {
             return Err(AtlasError::Unfit(

@@ -1,0 +1,382 @@
+//! Frames: from an atlas and a mix straight to the pixels of a display, one per element, in few instructions.
+//!
+//! Two [`Form`]s of codes, one for all lights of an atlas:
+//!
+//! * [`Lum`]: a luminance code stands for a colour once its light has one, so a light needs a table of 256 words that hold red,
+//!   green and blue side by side in 10, 12 and 10 bits, and one addition adds all three. The full scale of a
+//!   [`FrameMix`] keeps them from running into each other;
+//! * [`Colour`]: a table of 256 for each channel, in 16 bits.
+//!
+//! [`full`] adds up `K` tables; [`Sums`] keeps what was added, for lights that change one at a time or
+//! whose tables do not fit into memory together. Sums wrap, so undoing a change restores the same bits.
+//! `K` is a constant because it halves the instructions. Any mixture of codes, tiles above all, goes through [`full_any`],
+//! which decodes first.
+
+use super::frame::{Encode, Finish, FrameMix, Terms, Weight};
+use super::{CodeTable, RelightError, check_elements};
+use crate::atlas::Atlas;
+use crate::code::Code;
+
+/// Elements that are added up together.
+const BLOCK: usize = 4;
+
+/// Bits of red, green and blue in a packed word, red at the top.
+const PACKED: [u32; 3] = [10, 12, 10];
+
+/// Bits of a sum by itself.
+const SINGLE: u32 = 16;
+
+/// How the codes of an element are stored, and their contributions summed.
+pub trait Form {
+    /// What all lights of the atlas are written in has so many bytes.
+    type Codes: Copy;
+    /// The contribution of a light, or a sum of them.
+    type Sum: Copy + Default;
+    /// The contributions of every code.
+    type Table;
+
+    /// Bits of a sum.
+    const BITS: [u32; 3];
+
+    /// The codes of all elements, whose lights stand next to each other; `None` for lights in another form.
+    fn codes<'a>(atlas: &Atlas<'a>) -> Option<&'a [Self::Codes]>;
+
+    /// Fills a table with the difference of what two weights of a light make of every code.
+    fn fill(table: &mut Self::Table, before: &Terms, after: &Terms);
+
+    /// A sum, and what a table says of some codes.
+    #[must_use]
+    fn add(sum: Self::Sum, table: &Self::Table, codes: Self::Codes) -> Self::Sum;
+
+    /// What is shown of a sum.
+    #[must_use]
+    fn steps(sum: Self::Sum, factors: [u32; 3]) -> [u32; 3];
+}
+
+/// All lights in [`Code::Lum8`].
+#[derive(Clone, Copy, Debug)]
+pub struct Lum;
+
+impl Form for Lum {
+    type Codes = u8;
+    type Sum = u32;
+    type Table = [u32; 256];
+
+    const BITS: [u32; 3] = PACKED;
+
+    fn codes<'a>(atlas: &Atlas<'a>) -> Option<&'a [u8]> {
+        let fits = atlas.lights().all(|light| light.code == Code::Lum8);
+        fits.then_some(atlas.codes())
+    }
+
+    fn fill(table: &mut [u32; 256], before: &Terms, after: &Terms) {
+        let pack = |[(r, values), (g, _), (b, _)]: &Terms, code| {
+            let value = values.of(code);
+            r.of(value) << 22 | g.of(value) << 10 | b.of(value)
+        };
+        for (entry, code) in table.iter_mut().zip(0..) {
+            *entry = pack(after, code).wrapping_sub(pack(before, code));
+        }
+    }
+
+    #[inline(always)]
+    fn add(sum: u32, table: &[u32; 256], code: u8) -> u32 {
+        sum.wrapping_add(entry(table, code))
+    }
+
+    #[inline(always)]
+    fn steps(sum: u32, [r, g, b]: [u32; 3]) -> [u32; 3] {
+        // Products of 10 or 12 bits and 16; steps of 11.
+        [
+            ((sum >> 22) * r) >> 15,
+            ((sum >> 10 & 0xfff) * g) >> 17,
+            ((sum & 0x3ff) * b) >> 15,
+        ]
+    }
+}
+
+/// All lights in codes of three bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct Colour;
+
+impl Form for Colour {
+    type Codes = [u8; 3];
+    type Sum = [u16; 3];
+    type Table = [[u16; 256]; 3];
+
+    const BITS: [u32; 3] = [SINGLE; 3];
+
+    fn codes<'a>(atlas: &Atlas<'a>) -> Option<&'a [[u8; 3]]> {
+        let fits = atlas.lights().all(|light| light.code.bytes() == 3);
+        fits.then_some(atlas.codes().as_chunks().0)
+    }
+
+    fn fill(tables: &mut [[u16; 256]; 3], before: &Terms, after: &Terms) {
+        for ((table, before), after) in tables.iter_mut().zip(before).zip(after) {
+            let (weight, values) = after;
+            for (entry, code) in table.iter_mut().zip(0..) {
+                let value = values.of(code);
+                *entry = weight.of(value).wrapping_sub(before.0.of(value)) as u16;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn add(sum: [u16; 3], tables: &[[u16; 256]; 3], codes: [u8; 3]) -> [u16; 3] {
+        let ([r, g, b], [red, green, blue]) = (sum, tables);
+        let [code_r, code_g, code_b] = codes;
+        [
+            r.wrapping_add(entry(red, code_r)),
+            g.wrapping_add(entry(green, code_g)),
+            b.wrapping_add(entry(blue, code_b)),
+        ]
+    }
+
+    #[inline(always)]
+    fn steps(sum: [u16; 3], factors: [u32; 3]) -> [u32; 3] {
+        let ([r, g, b], [factor_r, factor_g, factor_b]) = (sum.map(u32::from), factors);
+        [
+            (r * factor_r) >> 21,
+            (g * factor_g) >> 21,
+            (b * factor_b) >> 21,
+        ]
+    }
+}
+
+#[inline(always)]
+fn entry<V: Copy>(table: &[V; 256], code: u8) -> V {
+    // A byte cannot leave a table of 256.
+    #[allow(clippy::indexing_slicing)]
+    table[usize::from(code)]
+}
+
+/// Multiplies out one light of a mix.
+///
+/// # Errors
+/// [`RelightError::Lights`] without such a light.
+pub fn fill_table<F: Form>(
+    atlas: &Atlas,
+    mix: &FrameMix,
+    light: u32,
+    table: &mut F::Table,
+) -> Result<(), RelightError> {
+    let after = mix.terms(atlas, light, F::BITS)?;
+    F::fill(
+        table,
+        &after.map(|(_, values)| (Weight::ZERO, values)),
+        &after,
+    );
+    Ok(())
+}
+
+/// The pixels of all elements, from the tables of all `K` lights.
+///
+/// # Errors
+/// Slices and runs that do not fit the atlas; [`RelightError::Code`] for another form.
+pub fn full<F: Form, const K: usize, T: Encode>(
+    atlas: &Atlas,
+    tables: &[F::Table; K],
+    finish: &Finish<T>,
+    pixels: &mut [T::Pixel],
+) -> Result<(), RelightError> {
+    check_elements(atlas, pixels.len())?;
+    let mut rows = rows::<F, K>(atlas)?;
+    finish.by_run(pixels, |pixels, factors| {
+        let own = rows.split_off(..pixels.len()).unwrap_or_default();
+        let (blocks, rest) = own.as_chunks::<BLOCK>();
+        let (out, out_rest) = pixels.as_chunks_mut::<BLOCK>();
+        for (rows, pixels) in blocks.iter().zip(out) {
+            show::<F, K, BLOCK, T>(rows, tables, finish, factors, pixels);
+        }
+        let (singles, _) = rest.as_chunks::<1>();
+        let (out, _) = out_rest.as_chunks_mut::<1>();
+        for (rows, pixels) in singles.iter().zip(out) {
+            show::<F, K, 1, T>(rows, tables, finish, factors, pixels);
+        }
+    })
+}
+
+/// Some pixels of [`full`]: light by light, so that its table is found once for all of them.
+#[inline(always)]
+fn show<F: Form, const K: usize, const N: usize, T: Encode>(
+    rows: &[[F::Codes; K]; N],
+    tables: &[F::Table; K],
+    finish: &Finish<T>,
+    factors: [u32; 3],
+    pixels: &mut [T::Pixel; N],
+) {
+    let mut sums = [F::Sum::default(); N];
+    for (light, table) in tables.iter().enumerate() {
+        for (sum, row) in sums.iter_mut().zip(rows) {
+            if let Some(codes) = row.get(light) {
+                *sum = F::add(*sum, table, *codes);
+            }
+        }
+    }
+    for (pixel, sum) in pixels.iter_mut().zip(sums) {
+        *pixel = finish.tone.encode(F::steps(sum, factors));
+    }
+}
+
+/// Sums of all elements, kept from frame to frame.
+#[derive(Debug)]
+pub struct Sums<'a, F: Form> {
+    sums: &'a mut [F::Sum],
+    /// Of one light at a time.
+    table: &'a mut F::Table,
+}
+
+impl<'a, F: Form> Sums<'a, F> {
+    /// Adds up a mix, light after light, in `sums` of one entry per element; `K` lights.
+    ///
+    /// # Errors
+    /// A slice that does not fit the atlas; [`RelightError::Code`] for another form.
+    pub fn new<const K: usize>(
+        atlas: &Atlas,
+        mix: &FrameMix,
+        sums: &'a mut [F::Sum],
+        table: &'a mut F::Table,
+    ) -> Result<Self, RelightError> {
+        check_elements(atlas, sums.len())?;
+        let rows = rows::<F, K>(atlas)?;
+        sums.fill(F::Sum::default());
+        for light in 0..K {
+            fill_table::<F>(atlas, mix, light as u32, table)?;
+            for (sum, row) in sums.iter_mut().zip(rows) {
+                if let Some(codes) = row.get(light) {
+                    *sum = F::add(*sum, table, *codes);
+                }
+            }
+        }
+        Ok(Self { sums, table })
+    }
+
+    /// The pixels of all elements.
+    ///
+    /// # Errors
+    /// Slices and runs of different lengths.
+    pub fn show<T: Encode>(
+        &self,
+        finish: &Finish<T>,
+        pixels: &mut [T::Pixel],
+    ) -> Result<(), RelightError> {
+        let mut sums = &*self.sums;
+        finish.by_run(pixels, |pixels, factors| {
+            let own = sums.split_off(..pixels.len()).unwrap_or_default();
+            for (sum, pixel) in own.iter().zip(pixels) {
+                *pixel = finish.tone.encode(F::steps(*sum, factors));
+            }
+        })
+    }
+
+    /// Sets the levels of one light, corrects the sums for it, and shows them.
+    ///
+    /// # Errors
+    /// Slices and runs that do not fit the atlas, or no such light. Nothing has changed then, but the pixels.
+    pub fn change<const K: usize, T: Encode>(
+        &mut self,
+        atlas: &Atlas,
+        mix: &mut FrameMix,
+        (light, levels): (u32, [u16; 3]),
+        finish: &Finish<T>,
+        pixels: &mut [T::Pixel],
+    ) -> Result<(), RelightError> {
+        check_elements(atlas, pixels.len())?;
+        finish.check(pixels.len())?;
+        let mut rows = rows::<F, K>(atlas)?;
+        let before = mix.terms(atlas, light, F::BITS)?;
+        mix.set(light, levels);
+        let after = mix.terms(atlas, light, F::BITS)?;
+        F::fill(self.table, &before, &after);
+        let (light, table, mut sums) = (light as usize, &*self.table, &mut *self.sums);
+        finish.by_run(pixels, |pixels, factors| {
+            let own = rows.split_off(..pixels.len()).unwrap_or_default();
+            let sums = sums.split_off_mut(..pixels.len()).unwrap_or_default();
+            for ((sum, pixel), row) in sums.iter_mut().zip(pixels).zip(own) {
+                if let Some(codes) = row.get(light) {
+                    *sum = F::add(*sum, table, *codes);
+                }
+                *pixel = finish.tone.encode(F::steps(*sum, factors));
+            }
+        })
+    }
+}
+
+/// Contributions of every code of every light, in codes of any kind.
+#[derive(Debug)]
+pub struct AnyTable<'a>(CodeTable<'a, u16>);
+
+impl<'a> AnyTable<'a> {
+    /// Multiplies out a mix into `values`, which has [`table_length`](super::table_length) entries or more.
+    ///
+    /// # Errors
+    /// [`RelightError::Table`]; a mix of another atlas.
+    pub fn new(atlas: &Atlas, mix: &FrameMix, values: &'a mut [u16]) -> Result<Self, RelightError> {
+        let mut table = Self(CodeTable::new(atlas, values)?);
+        for light in 0..atlas.light_count() {
+            table.update(atlas, mix, light)?;
+        }
+        Ok(table)
+    }
+
+    /// Follows a change of one light of the mix.
+    ///
+    /// # Errors
+    /// [`RelightError::Lights`] without such a light.
+    pub fn update(
+        &mut self,
+        atlas: &Atlas,
+        mix: &FrameMix,
+        light: u32,
+    ) -> Result<(), RelightError> {
+        let terms = mix.terms(atlas, light, [SINGLE; 3])?;
+        self.0.fill(light, |channel, code| {
+            let term = terms.get(channel);
+            // Below the full scale.
+            term.map_or(0, |(weight, values)| weight.of(values.of(code)) as u16)
+        });
+        Ok(())
+    }
+}
+
+/// The pixels of all elements of an atlas in any codes; `sums` is scratch of one entry per element.
+///
+/// # Errors
+/// Slices and runs that do not fit the atlas.
+pub fn full_any<T: Encode>(
+    atlas: &Atlas,
+    table: &AnyTable,
+    finish: &Finish<T>,
+    sums: &mut [[u16; 3]],
+    pixels: &mut [T::Pixel],
+) -> Result<(), RelightError> {
+    check_elements(atlas, sums.len())?;
+    check_elements(atlas, pixels.len())?;
+    sums.fill([0; 3]);
+    atlas.for_each(|element, light, [code_r, code_g, code_b]| {
+        if let Some(sum) = sums.get_mut(element as usize) {
+            let [r, g, b] = *sum;
+            *sum = [
+                r.wrapping_add(table.0.get(light, 0, code_r)),
+                g.wrapping_add(table.0.get(light, 1, code_g)),
+                b.wrapping_add(table.0.get(light, 2, code_b)),
+            ];
+        }
+    });
+    let mut sums = &*sums;
+    finish.by_run(pixels, |pixels, factors| {
+        let own = sums.split_off(..pixels.len()).unwrap_or_default();
+        for (sum, pixel) in own.iter().zip(pixels) {
+            *pixel = finish.tone.encode(Colour::steps(*sum, factors));
+        }
+    })
+}
+
+/// Every element's codes of all its `K` lights.
+fn rows<'a, F: Form, const K: usize>(
+    atlas: &Atlas<'a>,
+) -> Result<&'a [[F::Codes; K]], RelightError> {
+    super::check_lights(atlas, K)?;
+    let codes = F::codes(atlas).ok_or(RelightError::Code)?;
+    Ok(codes.as_chunks().0)
+}
