@@ -35,8 +35,9 @@ use relume::relight::{FixedMix, FixedTable, FixedWeight, RelightError, table_len
 
 pub use lamp::{LAMPS, Lamp, ROOMS};
 pub use layout::{PICTURE, SCREEN, slider};
+pub use tone::EXPOSURE;
 
-use tone::Tone;
+use tone::{STEPS, Tone};
 
 /// Lights of the atlas: the lamps, and the dusk outside, which nobody can switch.
 pub const LIGHTS: usize = LAMPS + 1;
@@ -44,11 +45,12 @@ pub const LIGHTS: usize = LAMPS + 1;
 /// Codes of a light and channel that [`Memory`] has room for.
 pub const LEVELS: usize = 512;
 
-/// What the panel works in; 43 KiB. A `static` of a device, a box of a host.
+/// What the panel works in; 51 KiB. A `static` of a device, a box of a host.
 #[derive(Debug)]
 pub struct Memory {
     weights: [FixedWeight; LIGHTS],
     table: [u32; LIGHTS * 3 * LEVELS],
+    greys: [u16; STEPS],
 }
 
 impl Memory {
@@ -58,6 +60,7 @@ impl Memory {
         Self {
             weights: [FixedWeight::EMPTY; LIGHTS],
             table: [0; LIGHTS * 3 * LEVELS],
+            greys: [0; STEPS],
         }
     }
 }
@@ -75,7 +78,7 @@ pub struct Panel<'a> {
     lamps: [Lamp; LAMPS],
     mix: FixedMix<'a>,
     table: FixedTable<'a>,
-    tone: Tone,
+    tone: Tone<'a>,
 }
 
 impl<'a> Panel<'a> {
@@ -103,7 +106,7 @@ impl<'a> Panel<'a> {
         Some(Self {
             atlas,
             lamps,
-            tone: Tone::new(mix.unit()),
+            tone: Tone::new(mix.unit(), &mut memory.greys),
             mix,
             table,
         })
