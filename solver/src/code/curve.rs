@@ -176,6 +176,16 @@ impl Curve {
         }
     }
 
+    /// Whether a code has a value below 2^127, and so has its [`Self::magnitude`]; without floats.
+    #[must_use]
+    pub fn reaches(&self, code: u16) -> bool {
+        let (value, scale) = (self.magnitude(code), self.scale());
+        let octave = |mantissa: u64, exponent: i32| 64 - mantissa.leading_zeros() as i32 + exponent;
+        let product = u64::from(value.mantissa) * u64::from(scale.mantissa());
+        octave(value.mantissa.into(), value.exponent) <= 127
+            && octave(product, value.exponent + i32::from(scale.exponent())) <= 127
+    }
+
     /// The value of a code, at unit emission.
     #[must_use]
     pub fn decode(&self, code: u16) -> f32 {

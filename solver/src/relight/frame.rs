@@ -16,7 +16,7 @@ use core::f32::consts::FRAC_1_PI;
 use core::num::NonZeroUsize;
 
 use super::{RelightError, Wide, check_lights};
-use crate::atlas::{Atlas, AtlasLight};
+use crate::atlas::{Atlas, AtlasLight, Block, LARGEST_SIDE, Tiles};
 use crate::code::{Curve, Magnitude, Scale};
 use crate::color::Rgb;
 
@@ -216,24 +216,61 @@ impl<'a> FrameMix<'a> {
         }
     }
 
-    /// The largest sum of every channel with all lights at their full weights, in 2^-16 of the full scale;
-    /// the full scale itself where a light is in tiles.
+    /// The largest sum of every channel with all lights at their full weights, in 2^-16 of the full scale.
     fn brightest(&self, atlas: &Atlas) -> [u32; 3] {
+        let mut brightest = self.brightest_of_rows(atlas);
+        if let Some(tiles) = atlas.tiles() {
+            let in_tiles = self.brightest_of_tiles(atlas, &tiles);
+            // No element has more of both.
+            for (sum, other) in brightest.iter_mut().zip(in_tiles) {
+                *sum += other;
+            }
+        }
+        brightest
+    }
+
+    /// Of the lights in tiles. Its stack of 5 KB is its own.
+    #[inline(never)]
+    fn brightest_of_tiles(&self, atlas: &Atlas, tiles: &Tiles) -> [u32; 3] {
+        let mut brightest = [0; 3];
+        let mut block: Block = [[0; 3]; LARGEST_SIDE * LARGEST_SIDE];
+        for (place, mut bits) in tiles.iter() {
+            let mut sums = [[0; 3]; LARGEST_SIDE * LARGEST_SIDE];
+            let lights = atlas.lights().zip(self.lights.iter());
+            for (light, entry) in lights.filter(|(light, _)| light.code.is_tiled()) {
+                if bits.next_light(place, light.last, &mut block) {
+                    let terms = entry.full_terms(&light);
+                    for (sums, codes) in sums.iter_mut().zip(&block).take(place.len()) {
+                        for ((sum, (weight, values)), code) in
+                            sums.iter_mut().zip(&terms).zip(codes)
+                        {
+                            *sum += weight.of(values.of(*code));
+                        }
+                    }
+                }
+            }
+            keep_largest(&mut brightest, &sums);
+        }
+        brightest
+    }
+
+    /// Of the lights that are not in tiles.
+    fn brightest_of_rows(&self, atlas: &Atlas) -> [u32; 3] {
         let stride = atlas
             .lights()
             .map(|light| light.code.bytes())
             .sum::<usize>();
-        let Some(length) = NonZeroUsize::new(stride * CHUNK).filter(|_| atlas.tiles().is_none())
-        else {
-            return [1 << BITS; 3];
+        let Some(stride) = NonZeroUsize::new(stride) else {
+            return [0; 3];
         };
         let mut brightest = [0; 3];
-        for rows in atlas.codes().chunks(length.get()) {
+        for rows in atlas.codes().chunks(stride.get().saturating_mul(CHUNK)) {
             let mut sums = [[0; 3]; CHUNK];
             let mut rest = rows;
-            for (light, entry) in atlas.lights().zip(self.lights.iter()) {
+            let lights = atlas.lights().zip(self.lights.iter());
+            for (light, entry) in lights.filter(|(light, _)| !light.code.is_tiled()) {
                 let terms = entry.full_terms(&light);
-                let mut codes = rest.chunks(stride);
+                let mut codes = rest.chunks(stride.get());
                 for (sums, codes) in sums.iter_mut().zip(&mut codes) {
                     let codes = match (light.code.bytes(), codes) {
                         (3, [r, g, b, ..]) => [*r, *g, *b],
@@ -246,11 +283,7 @@ impl<'a> FrameMix<'a> {
                 }
                 rest = rest.get(light.code.bytes()..).unwrap_or_default();
             }
-            for sums in sums {
-                for (largest, sum) in brightest.iter_mut().zip(sums) {
-                    *largest = sum.max(*largest);
-                }
-            }
+            keep_largest(&mut brightest, &sums);
         }
         brightest
     }
@@ -305,6 +338,14 @@ impl FrameLight {
             ..*self
         };
         full.terms(light, [BITS as u32; 3])
+    }
+}
+
+fn keep_largest(largest: &mut [u32; 3], sums: &[[u32; 3]]) {
+    for sums in sums {
+        for (largest, sum) in largest.iter_mut().zip(sums) {
+            *largest = (*largest).max(*sum);
+        }
     }
 }
 

@@ -17,8 +17,11 @@ use super::{CodeTable, RelightError, check_elements};
 use crate::atlas::Atlas;
 use crate::code::Code;
 
-/// Elements that are added up together.
-const BLOCK: usize = 4;
+/// Elements that are added up before they are shown.
+const CHUNK: usize = 32;
+
+/// Sums that are kept in registers; fewer where there are no atomics, on cores that have eight registers for most of what they do.
+const BLOCK: usize = if cfg!(target_has_atomic = "32") { 8 } else { 4 };
 
 /// Bits of red, green and blue in a packed word, red at the top.
 const PACKED: [u32; 3] = [10, 12, 10];
@@ -183,39 +186,49 @@ pub fn full<F: Form, const K: usize, T: Encode>(
     let mut rows = rows::<F, K>(atlas)?;
     finish.by_run(pixels, |pixels, factors| {
         let own = rows.split_off(..pixels.len()).unwrap_or_default();
-        let (blocks, rest) = own.as_chunks::<BLOCK>();
-        let (out, out_rest) = pixels.as_chunks_mut::<BLOCK>();
-        for (rows, pixels) in blocks.iter().zip(out) {
-            show::<F, K, BLOCK, T>(rows, tables, finish, factors, pixels);
-        }
-        let (singles, _) = rest.as_chunks::<1>();
-        let (out, _) = out_rest.as_chunks_mut::<1>();
-        for (rows, pixels) in singles.iter().zip(out) {
-            show::<F, K, 1, T>(rows, tables, finish, factors, pixels);
+        for (rows, pixels) in own.chunks(CHUNK).zip(pixels.chunks_mut(CHUNK)) {
+            let mut sums = [F::Sum::default(); CHUNK];
+            add_up::<F, K>(rows, tables, &mut sums);
+            for (pixel, sum) in pixels.iter_mut().zip(sums) {
+                *pixel = finish.tone.encode(F::steps(sum, factors));
+            }
         }
     })
 }
 
-/// Some pixels of [`full`]: light by light, so that its table is found once for all of them.
-#[inline(always)]
-fn show<F: Form, const K: usize, const N: usize, T: Encode>(
-    rows: &[[F::Codes; K]; N],
-    tables: &[F::Table; K],
-    finish: &Finish<T>,
-    factors: [u32; 3],
-    pixels: &mut [T::Pixel; N],
+/// Sums of some elements. A function of its own has the registers for it, and loops that are not merged with others.
+#[inline(never)]
+fn add_up<F: Form, const K: usize>(
+    rows: &[[F::Codes; K]],
+    tables: &[F::Table],
+    sums: &mut [F::Sum; CHUNK],
 ) {
+    let (blocks, rest) = rows.as_chunks::<BLOCK>();
+    let (block_sums, _) = sums.as_chunks_mut::<BLOCK>();
+    for (rows, sums) in blocks.iter().zip(block_sums) {
+        *sums = add_block::<F, K, BLOCK>(rows, tables);
+    }
+    let sums = sums.iter_mut().skip(blocks.len() * BLOCK);
+    for (row, sum) in rest.as_chunks().0.iter().zip(sums) {
+        [*sum] = add_block::<F, K, 1>(row, tables);
+    }
+}
+
+/// Light by light, so that its table is found once for all elements.
+#[inline(always)]
+fn add_block<F: Form, const K: usize, const N: usize>(
+    rows: &[[F::Codes; K]; N],
+    tables: &[F::Table],
+) -> [F::Sum; N] {
     let mut sums = [F::Sum::default(); N];
-    for (light, table) in tables.iter().enumerate() {
+    for (light, table) in (0..K).zip(tables) {
         for (sum, row) in sums.iter_mut().zip(rows) {
             if let Some(codes) = row.get(light) {
                 *sum = F::add(*sum, table, *codes);
             }
         }
     }
-    for (pixel, sum) in pixels.iter_mut().zip(sums) {
-        *pixel = finish.tone.encode(F::steps(sum, factors));
-    }
+    sums
 }
 
 /// Sums of all elements, kept from frame to frame.
@@ -269,10 +282,10 @@ impl<'a, F: Form> Sums<'a, F> {
         })
     }
 
-    /// Sets the levels of one light, corrects the sums for it, and shows them.
+    /// Sets the levels of one light, corrects the sums for it, and shows them: [`Self::set`] and [`Self::apply`].
     ///
     /// # Errors
-    /// Slices and runs that do not fit the atlas, or no such light. Nothing has changed then, but the pixels.
+    /// Slices and runs that do not fit the atlas, or no such light. Nothing has changed then.
     pub fn change<const K: usize, T: Encode>(
         &mut self,
         atlas: &Atlas,
@@ -283,11 +296,41 @@ impl<'a, F: Form> Sums<'a, F> {
     ) -> Result<(), RelightError> {
         check_elements(atlas, pixels.len())?;
         finish.check(pixels.len())?;
-        let mut rows = rows::<F, K>(atlas)?;
+        rows::<F, K>(atlas)?;
+        self.set(atlas, mix, (light, levels))?;
+        self.apply::<K, T>(atlas, light, finish, pixels)
+    }
+
+    /// Sets the levels of one light, and multiplies out by how much it changes; [`Self::apply`] must follow.
+    ///
+    /// # Errors
+    /// [`RelightError::Lights`] without such a light. Nothing has changed then.
+    pub fn set(
+        &mut self,
+        atlas: &Atlas,
+        mix: &mut FrameMix,
+        (light, levels): (u32, [u16; 3]),
+    ) -> Result<(), RelightError> {
         let before = mix.terms(atlas, light, F::BITS)?;
         mix.set(light, levels);
         let after = mix.terms(atlas, light, F::BITS)?;
         F::fill(self.table, &before, &after);
+        Ok(())
+    }
+
+    /// Corrects the sums for the light that was set, and shows them.
+    ///
+    /// # Errors
+    /// Slices and runs that do not fit the atlas. Nothing has changed then.
+    pub fn apply<const K: usize, T: Encode>(
+        &mut self,
+        atlas: &Atlas,
+        light: u32,
+        finish: &Finish<T>,
+        pixels: &mut [T::Pixel],
+    ) -> Result<(), RelightError> {
+        check_elements(atlas, pixels.len())?;
+        let mut rows = rows::<F, K>(atlas)?;
         let (light, table, mut sums) = (light as usize, &*self.table, &mut *self.sums);
         finish.by_run(pixels, |pixels, factors| {
             let own = rows.split_off(..pixels.len()).unwrap_or_default();
