@@ -3,43 +3,27 @@
 //!
 //! Whatever is not installed is a failure in CI (variable `CI`); elsewhere a test says what it did not run.
 
-use std::fmt::Write as _;
+mod bake;
+mod inputs;
+
 use std::fs;
 use std::io::Write as _;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-use relume::atlas::{Atlas, Quantity};
+use inputs::{Input, hash, inputs};
+use relume::atlas::Atlas;
 use relume::code::Code;
-use relume::color::Rgb;
 use relume::relight::{
-    Colour, Finish, FixedMix, FixedWeight, Form, FrameLight, FrameMix, Lum, Run, add_lights,
-    fill_table, full, relight_fixed, show_sums,
+    Colour, Finish, FixedMix, FixedWeight, Form, FrameLight, FrameMix, Lum, add_lights,
+    relight_fixed, show_sums,
 };
-use relume::tone::{Rgb565Table, Rgb888Table};
-use relume_host::bake::{Settings, bake};
-use relume_host::builtin::{PaperLamps, paper_room};
+use relume::tone::Rgb888Table;
 use relume_host::export::firmware::{Language, files};
-use relume_host::pack::{Format, pack};
-use relume_host::solution::Solution;
 
-const LIGHTS: usize = 8;
-
-/// Levels of the first frame, and of the light that is changed.
-const LEVELS: [[u16; 3]; LIGHTS] = [
-    [65_535; 3],
-    [60_000, 40_000, 20_000],
-    [0; 3],
-    [1_000, 2_000, 65_535],
-    [30_000; 3],
-    [65_535, 0, 0],
-    [12_345, 23_456, 34_567],
-    [1; 3],
-];
-const CHANGED: u32 = 2;
-const CHANGE: [u16; 3] = [65_535, 50_000, 30_000];
+/// The light that is changed, as in the images of `tests/firmware`.
+const CHANGED: usize = 1;
 
 /// What is installed with one command of apt.
 const ARM: &str = "gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm";
@@ -118,229 +102,142 @@ fn library(target: &str) -> PathBuf {
     built.join(target).join("device")
 }
 
-/// FNV-1a, 32 bits.
-fn hash(bytes: &[u8]) -> u32 {
-    let step = |hash: u32, byte: &u8| (hash ^ u32::from(*byte)).wrapping_mul(0x0100_0193);
-    bytes.iter().fold(0x811c_9dc5, step)
+/// The hash of bytes as [`hash`] makes it of pairs of them; their number is even.
+fn hash_bytes(bytes: &[u8]) -> u32 {
+    let pairs = bytes.as_chunks().0.iter();
+    hash(
+        &pairs
+            .map(|pair| u16::from_le_bytes(*pair))
+            .collect::<Vec<u16>>(),
+    )
 }
 
-fn hash_words(words: impl IntoIterator<Item = u16>) -> u32 {
-    let bytes: Vec<u8> = words.into_iter().flat_map(u16::to_le_bytes).collect();
-    hash(&bytes)
-}
-
-/// An atlas, and what is done with it.
+/// An input, and what a program has to say of it.
 struct Case {
-    name: &'static str,
-    bytes: Vec<u8>,
-    runs: Vec<Run>,
-    exposure: f32,
-    /// What every program has to say.
+    input: Input,
     expected: Vec<(&'static str, u32)>,
-    /// Hashes of sums and unit in `relume_irradiance`.
-    irradiance: [u32; 2],
+    /// The same of what a small board has no memory for.
+    large: Vec<(&'static str, u32)>,
 }
 
-/// The paper's room with eight lamps, in luminance codes and in colour.
-fn cases() -> &'static [Case; 2] {
-    static CASES: OnceLock<[Case; 2]> = OnceLock::new();
+/// The inputs of the bare-metal images whose codes frames read.
+fn cases() -> &'static [Case] {
+    static CASES: OnceLock<Vec<Case>> = OnceLock::new();
     CASES.get_or_init(|| {
-        let room = paper_room(PaperLamps::Eight).unwrap();
-        let settings = Settings {
-            patch: Some(room.spacing.patch),
-            element: Some(room.spacing.element),
-            ..Settings::default()
-        };
-        let mut go_on = |_| ControlFlow::Continue(());
-        let solution = bake(&room.scene, &settings, &mut go_on).unwrap();
-        [
-            Case::new::<Lum>("lum", &solution, Code::Lum8, [0; 256]),
-            Case::new::<Colour>("colour", &solution, Code::Display8, [[0; 256]; 3]),
-        ]
+        let inputs = inputs().into_iter();
+        inputs
+            .filter(|input| !input.name.starts_with("tiles"))
+            .map(Case::new)
+            .collect()
     })
 }
 
-/// Elements that follow each other and reflect alike.
-fn runs(solution: &Solution) -> Vec<Run> {
-    let mut runs: Vec<Run> = Vec::new();
-    for element in &solution.mesh.elements {
-        let reflectance = element
-            .reflectance
-            .to_array()
-            .map(|r| (r * 65_536.0) as u16);
-        match runs.last_mut().filter(|run| run.reflectance == reflectance) {
-            Some(run) => run.elements += 1,
-            None => runs.push(Run {
-                elements: 1,
-                reflectance,
-            }),
-        }
+/// Three bytes for every element.
+fn bytes_of<F: Form>(input: &Input, mut table: F::Table) -> Vec<u8> {
+    let atlas = Atlas::parse(&input.atlas).unwrap();
+    let mut room = vec![FrameLight::EMPTY; input.full.len()];
+    let mut mix = FrameMix::new(&atlas, &input.full, &mut room).unwrap();
+    for (light, levels) in (0..).zip(&input.levels[1]) {
+        mix.set(light, *levels);
     }
-    runs
+    let tone = Rgb888Table::new(1024);
+    let finish = Finish::new(&atlas, &mix, &input.runs, input.exposure, &tone).unwrap();
+    let mut sums = vec![F::Sum::default(); atlas.element_count() as usize];
+    add_lights::<F>(&atlas, &mix, &mut table, &mut sums).unwrap();
+    let mut pixels = vec![[0; 3]; sums.len()];
+    show_sums::<F, _>(&atlas, &sums, &finish, &mut pixels).unwrap();
+    pixels.into_flattened()
 }
 
 impl Case {
-    fn new<F: Form>(name: &'static str, solution: &Solution, code: Code, table: F::Table) -> Self
-    where
-        F::Table: Clone,
-    {
-        let is_lum = code == Code::Lum8;
-        let quantity = if is_lum {
-            Quantity::Irradiance
+    fn new(input: Input) -> Self {
+        let [first, second] = &input.levels;
+        let mut changed = first.clone();
+        changed[CHANGED] = second[CHANGED];
+        let frame = |levels: &[[u16; 3]]| hash(&input.in_integers(levels));
+        let bytes = if input.name.starts_with("lum") {
+            bytes_of::<Lum>(&input, [0; 256])
         } else {
-            Quantity::Radiosity
+            bytes_of::<Colour>(&input, [[0; 256]; 3])
         };
-        let format = Format {
-            packing: code.into(),
-            quantity,
-            mesh: false,
-        };
-        let bytes = pack(solution, format).unwrap();
-        let elements = solution.mesh.elements.len() as u32;
-        let runs = if is_lum {
-            runs(solution)
-        } else {
-            vec![Run {
-                elements,
-                reflectance: [u16::MAX; 3],
-            }]
-        };
-
-        let atlas = Atlas::parse(&bytes).unwrap();
-        // The brightest element is about twice as bright as white.
-        let brightest = solution.relight(&[Rgb::WHITE; LIGHTS]);
-        let brightest = brightest
-            .iter()
-            .map(|value| value.max_channel())
-            .fold(0.0, f32::max);
-        let exposure = 2.0 * std::f32::consts::PI / brightest;
-        let mut case = Self {
-            name,
-            bytes: bytes.clone(),
-            runs,
-            exposure,
-            expected: Vec::new(),
-            irradiance: [0; 2],
-        };
-        case.expect::<F>(&atlas, &table);
-        case
-    }
-
-    /// What the Rust kernels make of it.
-    fn expect<F: Form>(&mut self, atlas: &Atlas, table: &F::Table)
-    where
-        F::Table: Clone,
-    {
-        let mut room = [FrameLight::EMPTY; LIGHTS];
-        let mut mix = FrameMix::new(atlas, &[Rgb::WHITE; LIGHTS], &mut room).unwrap();
-        let (narrow, wide) = (Rgb565Table::new(512), Rgb888Table::new(512));
-        let elements = atlas.element_count() as usize;
-        for (light, levels) in (0..).zip(LEVELS) {
-            mix.set(light, levels);
-        }
-        let frame = |mix: &FrameMix| {
-            let tables = (0..LIGHTS as u32).map(|light| {
-                let mut own = table.clone();
-                fill_table::<F>(atlas, mix, light, &mut own).unwrap();
-                own
-            });
-            let tables: Vec<F::Table> = tables.collect();
-            let tables: &[F::Table; LIGHTS] = tables[..].try_into().unwrap();
-            let finish = Finish::new(atlas, mix, &self.runs, self.exposure, &narrow).unwrap();
-            let mut pixels = vec![0; elements];
-            full::<F, LIGHTS, _>(atlas, tables, &finish, &mut pixels).unwrap();
-            hash_words(pixels)
-        };
-        let first = frame(&mix);
-        mix.set(CHANGED, CHANGE);
-        let second = frame(&mix);
-
-        let finish = Finish::new(atlas, &mix, &self.runs, self.exposure, &wide).unwrap();
-        let (mut own, mut sums) = (table.clone(), vec![F::Sum::default(); elements]);
-        add_lights::<F>(atlas, &mix, &mut own, &mut sums).unwrap();
-        let mut pixels = vec![[0; 3]; elements];
-        show_sums::<F, _>(atlas, &sums, &finish, &mut pixels).unwrap();
-        self.expected = vec![
-            ("full_565", first),
-            ("change_565", second),
-            ("change_888", hash(pixels.as_flattened())),
-            ("undone_565", first),
+        let expected = vec![
+            ("full_565", frame(second)),
+            ("change_565", frame(&changed)),
+            ("undone_565", frame(first)),
         ];
 
-        let white = [Rgb::WHITE; LIGHTS];
-        let mut weights = [FixedWeight::EMPTY; LIGHTS];
-        let fixed = FixedMix::new(atlas, &white, &white, &mut weights).unwrap();
-        let mut sums = vec![[0; 3]; elements];
-        relight_fixed(atlas, &fixed, &mut sums).unwrap();
-        let words: Vec<u8> = sums
-            .as_flattened()
-            .iter()
-            .flat_map(|s| s.to_le_bytes())
-            .collect();
-        self.irradiance = [hash(&words), hash(&fixed.unit().to_le_bytes())];
+        let atlas = Atlas::parse(&input.atlas).unwrap();
+        let mut weights = vec![FixedWeight::EMPTY; input.full.len()];
+        let fixed = FixedMix::new(&atlas, &input.full, &input.full, &mut weights).unwrap();
+        let mut sums = vec![[0; 3]; atlas.element_count() as usize];
+        relight_fixed(&atlas, &fixed, &mut sums).unwrap();
+        let sums = sums.as_flattened().iter().flat_map(|sum| sum.to_le_bytes());
+        let sums: Vec<u8> = sums.collect();
+        let large = vec![
+            ("full_888", hash_bytes(&bytes)),
+            ("irradiance", hash_bytes(&sums)),
+            ("unit", hash_bytes(&fixed.unit().to_le_bytes())),
+        ];
+        Self {
+            input,
+            expected,
+            large,
+        }
     }
 
-    /// Writes what `relight.c` includes: the atlas as `relume export --c` writes it, and numbers.
+    /// Writes what `relight.c` includes: the atlas as `relume export --c` does, and numbers.
     fn write_scene(&self, folder: &Path) {
-        let atlas = Atlas::parse(&self.bytes).unwrap();
-        for (name, bytes) in files(&atlas, &self.bytes, "room", Language::C) {
-            fs::write(folder.join(name), bytes).unwrap();
+        let Input {
+            atlas: bytes,
+            runs,
+            levels,
+            exposure,
+            ..
+        } = &self.input;
+        let atlas = Atlas::parse(bytes).unwrap();
+        for (name, text) in files(&atlas, bytes, "room", Language::C) {
+            fs::write(folder.join(name), text).unwrap();
         }
         let triple = |[r, g, b]: [u16; 3]| format!("{{{r}, {g}, {b}}}");
-        let runs = self.runs.iter();
-        let runs: Vec<_> = runs
-            .map(|run| format!("{{{}, {}}}", run.elements, triple(run.reflectance)))
-            .collect();
-        let mut text = String::new();
-        let sum = if self.name == "lum" { 4 } else { 6 };
-        let table = if self.name == "lum" { 1024 } else { 1536 };
-        let elements = atlas.element_count();
-        let memory = table + sum * elements + 32 * LIGHTS as u32;
-        let _ = writeln!(
-            text,
-            "#define ELEMENTS {elements}u\n#define LIGHTS {LIGHTS}u"
-        );
-        let _ = writeln!(
-            text,
-            "#define FRAME_MEMORY {memory}u\n#define CHANGED {CHANGED}u"
-        );
-        let _ = writeln!(text, "#define EXPOSURE {:e}f", self.exposure);
-        let _ = writeln!(
-            text,
-            "static const RelumeRun runs[] = {{{}}};",
-            runs.join(", ")
-        );
-        let levels = LEVELS.map(triple).join(", ");
-        let _ = writeln!(
-            text,
-            "static const RelumeLevels levels[LIGHTS] = {{{levels}}};"
-        );
-        let _ = writeln!(
-            text,
-            "static const RelumeLevels changed = {};",
-            triple(CHANGE)
+        let list = |items: Vec<String>| format!("{{{}}}", items.join(", "));
+        let run = |run: &relume::relight::Run| {
+            format!("{{{}, {}}}", run.elements, triple(run.reflectance))
+        };
+        let runs = list(runs.iter().map(run).collect());
+        let [first, second] = levels
+            .each_ref()
+            .map(|all| list(all.iter().copied().map(triple).collect()));
+        let (elements, lights) = (atlas.element_count(), atlas.light_count());
+        let is_lum = atlas.lights().all(|light| light.code == Code::Lum8);
+        let memory = if is_lum {
+            1024 + 4 * elements
+        } else {
+            1536 + 6 * elements
+        } + 20 * lights;
+        let text = format!(
+            "#define ELEMENTS {elements}u\n#define LIGHTS {lights}u\n#define CHANGED {CHANGED}u\n\
+             #define FRAME_MEMORY {memory}u\n#define EXPOSURE {exposure:e}f\n\
+             static const RelumeRun runs[] = {runs};\n\
+             static const RelumeLevels first[LIGHTS] = {first};\n\
+             static const RelumeLevels second[LIGHTS] = {second};\n"
         );
         fs::write(folder.join("scene.h"), text).unwrap();
     }
 
     /// Compares what a program said, `name number` on each line; names of other things are let be.
-    fn check(&self, said: &str, with_irradiance: bool) {
-        let number = |name: &str| {
+    fn check(&self, said: &str, with_large: bool) {
+        let large = self.large.iter().filter(|_| with_large);
+        for (name, expected) in self.expected.iter().chain(large) {
             let mut lines = said.lines().filter_map(|line| line.split_once(' '));
-            let found = lines.find(|(found, _)| *found == name);
-            found.map(|(_, value)| value.trim().parse::<u32>().unwrap())
-        };
-        for (name, expected) in &self.expected {
+            let found = lines
+                .find(|(found, _)| found == name)
+                .map(|(_, value)| value.trim());
             assert_eq!(
-                number(name),
-                Some(*expected),
+                found,
+                Some(&*expected.to_string()),
                 "{} {name}:\n{said}",
-                self.name
+                self.input.name
             );
-        }
-        if with_irradiance {
-            let found = ["irradiance", "unit"].map(number);
-            assert_eq!(found, self.irradiance.map(Some), "{}:\n{said}", self.name);
         }
     }
 }
@@ -372,7 +269,7 @@ fn the_header_is_made_from_the_source() {
 fn a_c_program_relights_on_the_desktop() {
     let library = library("").join("librelume_c.a");
     for case in cases() {
-        let folder = folder(&format!("desktop-{}", case.name));
+        let folder = folder(&format!("desktop-{}", case.input.name));
         case.write_scene(&folder);
         let program = folder.join("relight");
         let mut compile = Command::new("cc");
@@ -383,7 +280,6 @@ fn a_c_program_relights_on_the_desktop() {
             "-Wpedantic",
             "-Werror",
             "-O2",
-            "-DIRRADIANCE",
         ]);
         compile
             .arg("-I")
@@ -414,12 +310,7 @@ struct Board {
 
 const M4F: Board = Board {
     target: "thumbv7em-none-eabihf",
-    compiler: &[
-        "-mcpu=cortex-m4",
-        "-mfloat-abi=hard",
-        "-mfpu=fpv4-sp-d16",
-        "-DIRRADIANCE",
-    ],
+    compiler: &["-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"],
     emulator: &["-M", "mps2-an386", "-cpu", "cortex-m4"],
     flash: "4M",
     ram: "4M",
@@ -442,7 +333,7 @@ impl Board {
         }
         let library = library(self.target).join("librelume_c.a");
         for case in cases() {
-            let folder = folder(&format!("{}-{}", self.target, case.name));
+            let folder = folder(&format!("{}-{}", self.target, case.input.name));
             case.write_scene(&folder);
             let program = self.compile(&folder, &library);
             let names = output(Command::new("arm-none-eabi-nm").arg(&program));
@@ -470,10 +361,10 @@ impl Board {
                 found.status.success(),
                 "{} {}: {said}",
                 self.target,
-                case.name
+                case.input.name
             );
-            case.check(&said, self.compiler.contains(&"-DIRRADIANCE"));
-            println!("{} {}\n{said}", self.target, case.name);
+            case.check(&said, !self.compiler.contains(&"-DSMALL"));
+            println!("{} {}\n{said}", self.target, case.input.name);
         }
     }
 

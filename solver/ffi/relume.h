@@ -158,7 +158,7 @@ extern "C" {
 // The table for frames in which nothing is brighter than white.
 extern const struct RelumeRgb565Table relume_rgb565;
 
-// The table for frames in which elements may be four times as bright as white, with fewer steps below it.
+// The table for frames in which elements may be twice as bright as white, with half as many steps below it.
 extern const struct RelumeRgb565Table relume_rgb565_bright;
 
 // As [`relume_rgb565`].

@@ -90,7 +90,7 @@ pub struct RelumeLight {
     pub code_length: usize,
 }
 
-/// Parses the bytes of an atlas, checksum included, without copying them.
+/// Parses the bytes of an atlas, checksum included, without copying them; a mesh in it is left unread.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn relume_atlas_parse(
     bytes: *const u8,
@@ -100,7 +100,7 @@ pub unsafe extern "C" fn relume_atlas_parse(
     status((|| {
         // SAFETY: by the rules.
         let (bytes, atlas) = unsafe { (values(bytes, length)?, exclusive(atlas)?) };
-        *atlas = RelumeAtlas::new(Atlas::parse(bytes)?);
+        *atlas = RelumeAtlas::new(Atlas::parse_codes(bytes)?);
         Ok(())
     })())
 }

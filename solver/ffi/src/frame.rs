@@ -98,9 +98,9 @@ pub struct RelumeRgb888Table(Rgb888Table);
 #[unsafe(no_mangle)]
 pub static relume_rgb565: RelumeRgb565Table = RelumeRgb565Table(Rgb565Table::new(2048));
 
-/// The table for frames in which elements may be four times as bright as white, with fewer steps below it.
+/// The table for frames in which elements may be twice as bright as white, with half as many steps below it.
 #[unsafe(no_mangle)]
-pub static relume_rgb565_bright: RelumeRgb565Table = RelumeRgb565Table(Rgb565Table::new(512));
+pub static relume_rgb565_bright: RelumeRgb565Table = RelumeRgb565Table(Rgb565Table::new(1024));
 
 /// As [`relume_rgb565`].
 #[unsafe(no_mangle)]
@@ -108,7 +108,7 @@ pub static relume_rgb888: RelumeRgb888Table = RelumeRgb888Table(Rgb888Table::new
 
 /// As [`relume_rgb565_bright`].
 #[unsafe(no_mangle)]
-pub static relume_rgb888_bright: RelumeRgb888Table = RelumeRgb888Table(Rgb888Table::new(512));
+pub static relume_rgb888_bright: RelumeRgb888Table = RelumeRgb888Table(Rgb888Table::new(1024));
 
 /// What a [`RelumeFrame`] holds.
 #[derive(Debug)]
