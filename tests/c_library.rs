@@ -3,7 +3,9 @@
 //!
 //! Whatever is not installed is a failure in CI (variable `CI`); elsewhere a test says what it did not run.
 
+#[expect(dead_code, reason = "other tests use the rest")]
 mod bake;
+#[expect(dead_code, reason = "the bare-metal images use the rest")]
 mod inputs;
 
 use std::fs;
@@ -423,4 +425,39 @@ fn a_c_program_relights_on_a_cortex_m4f() {
 #[test]
 fn a_c_program_relights_on_a_cortex_m0() {
     M0.run("the C program on an emulated Cortex-M0");
+}
+
+#[test]
+fn javascript_relights_by_web_assembly() {
+    let target = "wasm32-unknown-unknown";
+    let packages = "`apt-get install nodejs`";
+    if !is_installed("the library in WebAssembly", &["node"], target, packages) {
+        return;
+    }
+    let library = library(target).join("relume_c.wasm");
+    for case in cases() {
+        let Input {
+            name,
+            atlas,
+            runs,
+            full,
+            levels,
+            exposure,
+        } = &case.input;
+        let folder = folder(&format!("wasm-{name}"));
+        let [bytes, scene] = ["room.atlas", "scene.json"].map(|name| folder.join(name));
+        fs::write(&bytes, atlas).unwrap();
+        let numbers = serde_json::json!({
+            "full": full.iter().map(|full| full.to_array()).collect::<Vec<_>>(),
+            "levels": levels,
+            "runs": runs.iter().map(|run| (run.elements, run.reflectance)).collect::<Vec<_>>(),
+            "exposure": exposure,
+            "changed": CHANGED,
+        });
+        fs::write(&scene, numbers.to_string()).unwrap();
+        let mut node = Command::new("node");
+        node.arg(root().join("tests/c_library/relight.mjs"));
+        case.check(&output(node.args([&library, &bytes, &scene])), true);
+    }
+    println!("{target}: {} bytes", fs::metadata(library).unwrap().len());
 }

@@ -167,7 +167,7 @@ extern const struct RelumeRgb888Table relume_rgb888;
 // As [`relume_rgb565_bright`].
 extern const struct RelumeRgb888Table relume_rgb888_bright;
 
-// Parses the bytes of an atlas, checksum included, without copying them.
+// Parses the bytes of an atlas, checksum included, without copying them; a mesh in it is left unread.
 enum RelumeStatus relume_atlas_parse(const uint8_t *bytes,
                                      size_t length,
                                      struct RelumeAtlas *atlas);
