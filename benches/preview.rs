@@ -23,6 +23,7 @@ fn main() {
         surfaces: &solution.surfaces,
         irradiance: &solution.relight(&mix),
         exitance: &solution.face_exitance(&mix),
+        gathered: None,
     };
     pictures(&mut criterion, &relit, &camera(builtin.camera));
     criterion.final_summary();

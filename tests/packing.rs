@@ -59,6 +59,7 @@ fn first(solution: &Solution, lights: usize) -> Solution {
         lights: solution.lights[..lights].to_vec(),
         contributions: elements.flat_map(|v| v[..lights].iter().copied()).collect(),
         direct: None,
+        exposed: Vec::new(),
         method: solution.method,
         rows: solution.rows,
         spacing: solution.spacing,
@@ -143,14 +144,15 @@ fn sixty_four_lights_take_less_than_the_paper_took_for_eight() {
 
 /// Bakes 8640 elements of 64 and of 256 lights: minutes of CPU.
 ///
-/// 64 lights keep the aims of the issue; 256 miss them: limits there are what was
-/// measured (8.24 and 11.01 bits; 2.24 and 3.44 codes).
+/// 64 lights keep the aims of the issue; 256 keep that of `tiles` and miss the others: limits there are what was
+/// measured (10.64 bits in `tiles-log`; 2.24 and 3.44 codes in `display8`). What the rays of 256 dim lights leave
+/// to chance takes bits: baked with `--method rows` the same room takes 7.0 and 9.4.
 #[test]
 #[ignore = "slow: run it by name"]
 fn eight_bits_hold_an_element_on_the_fine_mesh() {
     let aims = [
         ("seed_room_64", 8.0, 10.0, [2.0, 3.0]),
-        ("seed_room_256", 8.3, 11.1, [2.3, 3.5]),
+        ("seed_room_256", 8.0, 10.7, [2.3, 3.5]),
     ];
     for (name, tiles, tiles_log, [achromatic, all]) in aims {
         let Some(room) = bake_scene(name, Some(0.083_333_3)) else {
@@ -441,6 +443,7 @@ fn row(lights: usize, contributions: Vec<Rgb>) -> Solution {
         lights: (0..lights).map(light).collect(),
         contributions,
         direct: None,
+        exposed: Vec::new(),
         method: Method::default(),
         rows: 0,
         spacing: Spacing {

@@ -378,6 +378,48 @@ fn pictures_of_the_lights_alone_add_up_to_the_picture_of_all() {
     }
 }
 
+/// Radiance times pi over reflectance is the irradiance that a probe gathers with the same rays; with
+/// exact far patches, as probes have them, the two differ by the noise of the rays.
+#[test]
+fn a_gathered_picture_shows_what_a_probe_gathers() {
+    let folder = with_scene();
+    // Patches as long as the room: none is far, and probes take rays alone, too.
+    folder.done("bake room.obj --patch 4 --element 0.25");
+    folder.done(&format!("bake room.obj {MESH} -o fine.solution"));
+    // (point, normal, reflectance): half in the shadow of the screen on the floor; a wall; a corner.
+    for (point, normal, reflectance) in [
+        ("3.1,0,1.2", "0,1,0", [0.4, 0.25, 0.1]),
+        ("2.1,1.1,0", "0,0,1", [0.75, 0.74, 0.7]),
+        ("0,0.05,0.3", "1,0,0", [0.6, 0.1, 0.08]),
+    ] {
+        folder.write("point.csv", format!("x,y,z,nx,ny,nz\n{point},{normal}\n"));
+        let eye = "--eye 3.3,2.2,2.4 --fov 1e-3 --size 1x1";
+        // 0.1 %: the pixel's place is the point but for rounding, past which a few of 2048 rays end in
+        // the next element. 3 %: rays alone, of a noise of some 1 % here.
+        for (solution, tolerance) in [("room", 1e-3), ("fine", 0.03)] {
+            folder.done(&format!(
+                "relight {solution}.solution --gather --rays 2048 --only ceiling=1,1,1 {eye} \
+                 --target {point} -o pixel.exr"
+            ));
+            let pixel = exr_values(&folder, "pixel.exr");
+            let csv = folder.done(&format!(
+                "probe {solution}.solution --gather --points point.csv"
+            ));
+            let probed = rows(&csv, "point").swap_remove(0);
+            assert_eq!(probed.light, "ceiling");
+            // Channels of the picture stand in the order of their names: blue first.
+            let channels = pixel.iter().rev().zip(reflectance);
+            for ((radiance, rho), expected) in channels.zip(probed.value) {
+                let found = radiance * std::f32::consts::PI / rho;
+                assert!(
+                    (found - expected).abs() <= tolerance * expected,
+                    "{solution}, {point}: {found} and {expected}"
+                );
+            }
+        }
+    }
+}
+
 #[test]
 fn unset_lights_stay_nominal_and_only_darkens_the_others() {
     let folder = with_room();
@@ -618,6 +660,7 @@ fn no_output_replaces_a_file_of_another_kind() {
     folder.misused("bake room.obj --keep-rows new -o new");
     folder.misused("bake room.obj --residual 2 -o new");
     folder.misused("probe room.solution --elements --gather");
+    folder.misused("relight room.solution --rays 64");
     assert!(folder.files() == before, "something was written");
 }
 
@@ -1016,6 +1059,10 @@ fn what_cannot_be_done_with_a_file_is_one_line_and_exit_1() {
         ),
         ("relight room.atlas --set \u{1b}=1", "`\\u{1b}`"),
         ("info es\u{1b}cape", "es\\u{1b}cape: cannot be read"),
+        (
+            "relight room.atlas --gather",
+            "room.atlas: an atlas does not keep what --gather needs",
+        ),
         ("relight room.atlas --size 0x10", "0 x 10"),
         ("relight room.atlas --size 20000x10", "16384"),
         ("relight room.atlas --fov 4", "field of view 4"),

@@ -56,8 +56,14 @@ fn no_format_is_worse_than_the_table_says() {
         "{TABLE} is to hold:\n{HEADER}\n{}",
         found.join("\n")
     );
+    assert_eq!(
+        stated.clone().count(),
+        rows.len(),
+        "{TABLE} is to hold:\n{HEADER}\n{}",
+        found.join("\n")
+    );
     let mut worse = Vec::new();
-    for (row, stated) in rows.iter().zip(stated.by_ref()) {
+    for (row, stated) in rows.iter().zip(stated) {
         let cells: Vec<&str> = stated.split(',').collect();
         assert_eq!(cells[..2], [&row.k.to_string(), row.format], "{stated}");
         let limits = cells[2..].iter().map(|cell| {
@@ -72,7 +78,6 @@ fn no_format_is_worse_than_the_table_says() {
             worse.push(format!("{}\n  table: {stated}", line(row)));
         }
     }
-    assert_eq!(stated.next(), None, "rows that are not measured");
     assert!(
         worse.is_empty(),
         "worse than the table:\n{}",

@@ -6,7 +6,7 @@ use relume::refine::Lanes;
 use super::direct::{self, DirectRow, DirectSource, Lamps};
 use super::{BakeError, Job, LANES, Settings, Solved};
 use crate::bvh::Bvh;
-use crate::gather::{Hits, RAYS_PER_PASS, Rays};
+use crate::gather::{DarkSides, Hits, RAYS_PER_PASS, Rays};
 use crate::mesh::{Locator, OwnedMesh};
 use crate::rows::Parallel;
 
@@ -52,6 +52,7 @@ pub(super) fn gather(
     light.bounce(&mesh, &Hits::default(), job.settings.residual);
     let locator = Locator::new(view);
     let rays = Rays::new(view, &locator, bvh);
+    let dark = DarkSides::new(job.scene, &locator);
     let mut hits = Hits::default();
     let mut next_look = FIRST_LOOK;
     while lamps.is_complete && (hits.passes() as u32) < passes {
@@ -59,7 +60,7 @@ pub(super) fn gather(
         if job.ends(rows, most, light.residual()) {
             break;
         }
-        hits.cast(&rays);
+        hits.cast(&rays, &dark);
         if hits.passes() as u32 == next_look.min(passes) {
             light.bounce(&mesh, &hits, job.settings.residual);
             if light.error() <= job.settings.noise {
@@ -70,7 +71,7 @@ pub(super) fn gather(
     }
     light.bounce(&mesh, &hits, job.settings.residual);
     let rows = lamps.rows + hits.passes() as u32;
-    Ok((light.solved(rows, mesh, job.settings), hits))
+    Ok((light.solved(rows, mesh, &hits, job.settings), hits))
 }
 
 /// Direct light of some lights, and its bounces along rays that were cast before.
@@ -93,7 +94,7 @@ pub(super) fn along(
         return Err(BakeError::Interrupted);
     }
     light.bounce(&mesh, hits, job.settings.residual);
-    Ok(light.solved(lamps.rows + passes, mesh, job.settings))
+    Ok(light.solved(lamps.rows + passes, mesh, hits, job.settings))
 }
 
 /// Light on the elements.
@@ -197,7 +198,7 @@ impl Light {
         errors.take(self.lights).fold(0.0, f32::max)
     }
 
-    fn solved(self, rows: u32, mesh: OwnedMesh, settings: &Settings) -> Solved {
+    fn solved(self, rows: u32, mesh: OwnedMesh, hits: &Hits, settings: &Settings) -> Solved {
         let irradiance: Vec<_> = self.blocks.iter().map(Block::irradiance).collect();
         let direct: Vec<_> = self.blocks.iter().map(|b| b.direct.clone()).collect();
         let residuals = self.blocks.iter().flat_map(|block| block.residuals);
@@ -207,6 +208,7 @@ impl Light {
             direct: settings
                 .split_direct
                 .then(|| by_element(&direct, self.lights)),
+            exposed: hits.exposed(mesh.elements.len()),
             residuals: residuals.take(self.lights).collect(),
             errors: errors.take(self.lights).collect(),
             rows,

@@ -358,6 +358,8 @@ struct Solved {
     mesh: OwnedMesh,
     contributions: Vec<Rgb>,
     direct: Option<Vec<Rgb>>,
+    /// One for each element.
+    exposed: Vec<f32>,
     /// One for each light.
     residuals: Vec<f32>,
     /// Relative L1 error of each light that rays or missing rows leave, estimated.
@@ -401,6 +403,7 @@ fn solution(scene: &OwnedScene, method: Method, spacing: Spacing, solved: Solved
             .collect(),
         contributions: solved.contributions,
         direct: solved.direct,
+        exposed: solved.exposed,
         method: match method {
             Method::Device => Method::Rows,
             Method::Gather | Method::Rows => method,

@@ -206,6 +206,7 @@ fn read_out(
         direct: settings
             .split_direct
             .then(|| collect(&|element, light| refinement.direct(element, light))),
+        exposed: Vec::new(),
         residuals: left.residuals,
         errors: left.errors,
         rows: refinement.rows_evaluated(),

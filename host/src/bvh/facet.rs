@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3, Vec4};
 use relume::geometry::Polygon;
 
+use super::Hit;
 use crate::linear::{Linear, parameter_gradients, span};
 
 /// Facets of a block.
@@ -103,6 +104,14 @@ impl Met {
     pub const fn is_surface(&self) -> bool {
         self.surface != u32::MAX
     }
+
+    pub fn hit(self) -> Option<Hit> {
+        self.is_surface().then_some(Hit {
+            surface: self.surface,
+            distance: self.distance,
+            front: self.front,
+        })
+    }
 }
 
 /// Four linear functions.
@@ -135,6 +144,12 @@ impl Linears {
     }
 }
 
+/// Heights above the planes of four facets, and their parameters, at the origin of rays.
+pub(super) struct Start {
+    height: Vec4,
+    parameters: [Vec4; 2],
+}
+
 /// Four facets; those that lack have gradients of zero, and nothing meets them.
 pub(super) struct Block {
     plane: Linears,
@@ -156,18 +171,51 @@ impl Block {
         }
     }
 
+    /// What rays from one origin have in common.
+    pub(super) fn start(&self, origin: Vec3) -> Start {
+        let origin = origin.to_array().map(Vec4::splat);
+        Start {
+            height: self.plane.at(origin),
+            parameters: [0, 1].map(|axis| self.parameters[axis].at(origin)),
+        }
+    }
+
+    /// Puts the nearest facet in place of what is farther, on a ray from where `start` was taken.
+    #[inline]
+    pub(super) fn meet_from(&self, start: &Start, direction: [Vec4; 3], met: &mut Met) {
+        self.meet_at(start.height, direction, met, |distance| {
+            let along = |axis: usize| self.parameters[axis].slope(direction) * distance;
+            [0, 1].map(|axis| start.parameters[axis] + along(axis))
+        });
+    }
+
     /// Puts the nearest facet in place of what is farther.
     #[inline]
     pub(super) fn meet(&self, ray: &Ray, met: &mut Met) {
-        let slope = self.plane.slope(ray.direction);
+        let height = self.plane.at(ray.origin);
+        self.meet_at(height, ray.direction, met, |distance| {
+            let place = ray.at(distance);
+            [0, 1].map(|axis| self.parameters[axis].at(place))
+        });
+    }
+
+    /// The same, by the height of the origin above the planes, and the parameters at some distances.
+    #[inline]
+    fn meet_at(
+        &self,
+        height: Vec4,
+        direction: [Vec4; 3],
+        met: &mut Met,
+        parameters: impl Fn(Vec4) -> [Vec4; 2],
+    ) {
+        let slope = self.plane.slope(direction);
         // Not a number, or not less than infinity, where the ray runs along the plane.
-        let distance = -self.plane.at(ray.origin) / slope;
+        let distance = -height / slope;
         let ahead = distance.cmpgt(Vec4::ZERO) & distance.cmplt(Vec4::splat(met.distance));
         if !ahead.any() {
             return;
         }
-        let place = ray.at(distance);
-        let [s, t] = [0, 1].map(|axis| self.parameters[axis].at(place));
+        let [s, t] = parameters(distance);
         let inside =
             s.min(t).cmpge(Vec4::ZERO) & s.max(t).cmple(Vec4::ONE) & (s + t).cmple(self.most);
         let mut hits = (ahead & inside).bitmask();

@@ -20,11 +20,12 @@ use obvhs::{Boundable, BvhBuildParams};
 
 use relume::geometry::Polygon;
 use relume::luminaire;
+use relume::mesh::Side;
 use relume::scene::{Scene, Source, Surface};
 use relume::visibility::{Bounds, Shaft, Visibility};
 
-pub use nearest::Caster;
 use nearest::Facets;
+pub use nearest::{Caster, PointCaster};
 
 /// Surfaces in a tree of boxes.
 pub struct Bvh {
@@ -54,6 +55,14 @@ pub struct Hit {
     pub distance: f32,
     /// True when the front of the surface was met.
     pub front: bool,
+}
+
+impl Hit {
+    /// The side of the surface that was met.
+    #[must_use]
+    pub const fn side(&self) -> Side {
+        if self.front { Side::Front } else { Side::Back }
+    }
 }
 
 /// A polygon's box, widened by the rounding that [`Polygon::crossing`] allows.
@@ -124,6 +133,12 @@ impl Bvh {
     #[must_use]
     pub const fn caster(&self) -> Caster<'_> {
         Caster::new(&self.facets)
+    }
+
+    /// The same from one [`lifted`] point.
+    #[must_use]
+    pub fn caster_from(&self, point: Vec3) -> PointCaster<'_> {
+        PointCaster::new(&self.facets, point)
     }
 
     fn crossing(&self, index: usize, from: Vec3, to: Vec3) -> Option<f32> {

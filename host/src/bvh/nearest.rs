@@ -15,7 +15,7 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use relume::scene::Surface;
 
-use super::facet::{Block, Facet, LANES, Met, Ray};
+use super::facet::{Block, Facet, LANES, Met, Ray, Start};
 use super::{Bounded, Hit};
 
 /// Most blocks that are asked one after the other: 32 facets.
@@ -73,6 +73,50 @@ impl<'a> Caster<'a> {
 impl std::fmt::Debug for Caster<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Caster").finish_non_exhaustive()
+    }
+}
+
+/// Casts rays from one point, one after the other: less work for each where surfaces are few.
+pub struct PointCaster<'a> {
+    caster: Caster<'a>,
+    from: Vec3,
+    /// One for each block, where all are asked.
+    starts: Vec<Start>,
+}
+
+impl<'a> PointCaster<'a> {
+    pub(super) fn new(facets: &'a Facets, from: Vec3) -> Self {
+        let blocks = facets.blocks.iter();
+        let starts = if facets.nodes.is_empty() {
+            blocks.map(|block| block.start(from)).collect()
+        } else {
+            Vec::new()
+        };
+        Self {
+            caster: Caster::new(facets),
+            from,
+            starts,
+        }
+    }
+
+    /// The surface that a ray meets first.
+    #[must_use]
+    pub fn nearest(&mut self, direction: Vec3) -> Option<Hit> {
+        if self.starts.is_empty() {
+            return self.caster.nearest(self.from, direction);
+        }
+        let mut met = Met::nothing(f32::INFINITY);
+        let direction = direction.to_array().map(Vec4::splat);
+        for (block, start) in self.caster.facets.blocks.iter().zip(&self.starts) {
+            block.meet_from(start, direction, &mut met);
+        }
+        met.hit()
+    }
+}
+
+impl std::fmt::Debug for PointCaster<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("PointCaster").finish_non_exhaustive()
     }
 }
 
@@ -145,11 +189,7 @@ impl Facets {
         } else {
             self.descend(&ray, direction, &mut met, waiting);
         }
-        met.is_surface().then_some(Hit {
-            surface: met.surface,
-            distance: met.distance,
-            front: met.front,
-        })
+        met.hit()
     }
 
     fn descend(&self, ray: &Ray, direction: Vec3, met: &mut Met, waiting: &mut Vec<(f32, Child)>) {

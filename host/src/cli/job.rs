@@ -102,6 +102,7 @@ impl Stage<'_> {
             surfaces: &self.solution.surfaces,
             irradiance,
             exitance,
+            gathered: None,
         }
     }
 

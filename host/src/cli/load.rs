@@ -74,6 +74,18 @@ impl Loaded {
         }
     }
 
+    /// What light can be gathered from: the solution that `path` holds.
+    pub fn to_gather(&self, path: &Path) -> Result<&Solution> {
+        match self {
+            Self::Solution(solution) => Ok(solution),
+            Self::Atlas { .. } => bail!(
+                "{}: an atlas does not keep what --gather needs; take the solution that it was packed \
+                 from",
+                path.display()
+            ),
+        }
+    }
+
     /// The quantity of every element under a mix, by the kernel that belongs to the file.
     pub fn relight(&self, mix: &[Rgb]) -> Result<Vec<Rgb>> {
         match self {

@@ -9,7 +9,8 @@ use serde_json::json;
 use super::load::{Loaded, load, read};
 use super::{Outcome, keep, output_path, tell, write_file};
 use crate::probe::{
-    Part, ProbeError, Probed, probe_elements, probe_gathered, probe_points, read_points,
+    MOST_RAYS, Part, ProbeError, Probed, RAYS, probe_elements, probe_gathered, probe_points,
+    read_points,
 };
 
 #[derive(Debug, Args)]
@@ -24,6 +25,9 @@ pub struct Arguments {
     /// Evaluate direct light exactly at the points and gather the indirect there: better than the mesh
     #[arg(long, requires = "points", conflicts_with = "elements")]
     gather: bool,
+    /// Rays that gather at each point: 64 for errors of some 2 %, 2048 for some tenths of a per cent
+    #[arg(long, value_name = "N", requires = "gather", default_value_t = RAYS, value_parser = clap::value_parser!(u32).range(1..=MOST_RAYS))]
+    rays: u32,
     /// Where the CSV goes; `-` is stdout
     #[arg(short, long, value_name = "OUT.csv", default_value = "-")]
     output: PathBuf,
@@ -68,14 +72,8 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
         Some(file) => {
             let points = read_points(&read(file)?).with_context(|| file.display().to_string())?;
             if arguments.gather {
-                if !matches!(loaded, Loaded::Solution(_)) {
-                    bail!(
-                        "{}: an atlas does not keep what --gather needs; probe the solution that it \
-                         was packed from",
-                        arguments.input.display()
-                    );
-                }
-                probe_gathered(solution, &points, part).map_err(named)?
+                let solution = loaded.to_gather(&arguments.input)?;
+                probe_gathered(solution, &points, part, arguments.rays).map_err(named)?
             } else {
                 probe_points(solution, &points, part).map_err(named)?
             }

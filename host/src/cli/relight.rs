@@ -15,7 +15,11 @@ use crate::export::exr;
 use crate::mesh::OwnedMesh;
 use crate::mix::{Setting, mix};
 use crate::picture::{self, Exposure, LinearImage, to_pixmap};
-use crate::preview::{Camera, CameraError, Relit, Viewpoint, render, show};
+use crate::preview::{Camera, CameraError, Gathered, Relit, Viewpoint, render, show};
+use crate::probe::{Gatherer, MOST_RAYS};
+
+/// Rays that gather at a pixel by default.
+const RAYS: u32 = 256;
 
 /// Behind everything.
 pub const BACKGROUND: [u8; 3] = [0, 0, 0];
@@ -42,6 +46,13 @@ pub struct Arguments {
     /// Factor on radiance, or `auto`: the 98th percentile of luminance becomes white
     #[arg(long, default_value = "auto", value_name = "auto|VALUE")]
     exposure: Exposure,
+    /// Evaluate direct light exactly at every pixel and gather the indirect there, by rays alone: better
+    /// than the mesh (of a solution only)
+    #[arg(long)]
+    gather: bool,
+    /// Rays that gather at each pixel: more for less grain
+    #[arg(long, value_name = "N", requires = "gather", default_value_t = RAYS, value_parser = clap::value_parser!(u32).range(1..=MOST_RAYS))]
+    rays: u32,
 }
 
 /// Where the picture is taken from; without any of it, the program chooses.
@@ -144,11 +155,23 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     let values = loaded.relight(&mix)?;
     let exitance = solution.face_exitance(&mix);
     let mesh = shown_mesh(&loaded);
+    let gatherer = if arguments.gather {
+        Some(Gatherer::new(
+            loaded.to_gather(&arguments.input)?,
+            arguments.rays,
+        ))
+    } else {
+        None
+    };
     let relit = Relit {
         mesh: mesh.view(),
         surfaces: &solution.surfaces,
         irradiance: &values,
         exitance: &exitance,
+        gathered: gatherer.as_ref().map(|gatherer| Gathered {
+            gatherer,
+            mix: &mix,
+        }),
     };
     let (width, height) = arguments.size;
     let aspect = width as f32 / height as f32;

@@ -75,6 +75,7 @@ pub fn contributions(layers: &[LightLayer]) -> (Solution, usize) {
             .collect(),
         contributions,
         direct: None,
+        exposed: Vec::new(),
         method: Method::default(),
         rows: 0,
         spacing: Spacing {

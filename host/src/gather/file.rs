@@ -2,13 +2,13 @@
 //!
 //! Version 1, little-endian: `RELUMERO`, `u32` version, `u32` checksum of the mesh
 //! ([`crate::solution::mesh_checksum`]), `u32` elements, `u32` passes; then for every pass 16 `u32` for
-//! each element, the number of the element that a ray hit or all ones; and a CRC-32 (ISO-HDLC) of
-//! everything before it, `u32`.
+//! each element, the number of the element that a ray hit, `u32::MAX` for none, or `u32::MAX - 1` for a
+//! ray in the dark; and a CRC-32 (ISO-HDLC) of everything before it, `u32`.
 
 use crc::{CRC_32_ISO_HDLC, Crc};
 use thiserror::Error;
 
-use super::{Hits, NOTHING, RAYS_PER_PASS};
+use super::{DARK, Hits, NOTHING, RAYS_PER_PASS};
 
 /// How a rows file starts.
 pub const MAGIC: [u8; 8] = *b"RELUMERO";
@@ -71,7 +71,7 @@ pub fn read(bytes: &[u8], mesh: u32, elements: usize) -> Result<Hits, RowsError>
         || CRC.checksum(&bytes[..bytes.len() - 4]) != checksum
         || hits
             .iter()
-            .any(|hit| *hit >= own_elements && *hit != NOTHING)
+            .any(|hit| *hit >= own_elements && !matches!(*hit, NOTHING | DARK))
     {
         return Err(RowsError::Damaged);
     }
@@ -91,7 +91,7 @@ mod tests {
     fn what_was_written_is_read_and_what_was_damaged_is_not() {
         let pass = |shift: u32| (0..32).map(|i| (i * 7 + shift) % 2).collect();
         let hits = Hits {
-            passes: vec![pass(0), pass(1), vec![NOTHING; 32]],
+            passes: vec![pass(0), pass(1), vec![NOTHING; 32], vec![DARK; 32]],
         };
         let bytes = write(&hits, 77, 2);
         assert_eq!(read(&bytes, 77, 2).unwrap().passes, hits.passes);

@@ -3,12 +3,15 @@
 //! A receiver casts `R` cosine-weighted rays; each ends in an element, in something that reflects
 //! nothing, or escapes, and stands for a form factor of `1 / R` (Malley's method):
 //!
-//! `E_j = D_j + 1/R sum_r rho_h(r) E_h(r)`
+//! `E_j = D_j + 1/R sum_r rho_h(r) E_h(r) / s_h(r)`
 //!
-//! with `E` the irradiance, `D` its direct part, which lamps and luminaires give exactly, and `h(r)`
-//! the element in which ray `r` ends. Every element shoots, so there is no substructuring error, and
+//! with `E` the irradiance, `D` its direct part, which lamps and luminaires give exactly, `h(r)`
+//! the element in which ray `r` ends, and `s` the share of an element that light can reach: where a box
+//! stands on a floor, the elements under its edges are partly dark, and rays only meet the other
+//! part. Every element shoots, so there is no substructuring error, and
 //! work grows with the elements alone. The places on the receiver and the directions are a rank-one
-//! sequence in four dimensions ([`noise::STEPS`]), shifted for every receiver by its number.
+//! sequence in four dimensions ([`noise::STEPS`]), shifted for every receiver by its number. From a point
+//! a known number of rays leaves along a Fibonacci lattice, which is more even.
 
 mod file;
 
@@ -16,12 +19,14 @@ use std::f32::consts::TAU;
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
+use relume::color::Rgb;
 use relume::geometry::{Polygon, from_unit_square};
-use relume::mesh::{Mesh, Side};
+use relume::mesh::{Mesh, Side, is_face};
 use relume::refine::Lanes;
 use relume::refine::krylov::{self, Work};
+use relume::scene::{Scene, Surface};
 
-use crate::bvh::{Bvh, Caster, lifted};
+use crate::bvh::{Bvh, Hit, lifted};
 use crate::mesh::Locator;
 use crate::noise;
 
@@ -29,6 +34,15 @@ pub use file::{MAGIC, RowsError, read, write};
 
 /// A ray that ends in no element.
 const NOTHING: u32 = u32::MAX;
+
+/// A ray that ends on a side that no light reaches, so that it started in the dark itself.
+const DARK: u32 = u32::MAX - 1;
+
+/// Least share of an element that counts as reached by light: direct light is sampled at four points.
+const LEAST_EXPOSED: f32 = 0.25;
+
+/// `1/g` with `g^2 = g + 1`, in parts of 2^32.
+const GOLDEN_STEP: u32 = 2_654_435_769;
 
 /// Rays of every element that are cast together.
 pub const RAYS_PER_PASS: u32 = 16;
@@ -53,7 +67,7 @@ pub struct Rays<'a> {
 }
 
 /// A point of the sequence without its shift: the same for every element.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Step {
     place: [u32; 2],
     share: u32,
@@ -79,6 +93,62 @@ impl Step {
     }
 }
 
+/// Directions of rays from one point, to be shifted and turned for each: a Fibonacci lattice.
+#[derive(Debug)]
+pub struct Fan(Vec<Step>);
+
+impl Fan {
+    /// Directions of `count` rays.
+    #[must_use]
+    pub fn new(count: u32) -> Self {
+        let step = |index: u32| Step {
+            share: ((u64::from(2 * index + 1) << 31) / u64::from(count)) as u32,
+            turn: Vec2::from_angle(TAU * noise::fraction(index.wrapping_mul(GOLDEN_STEP))),
+            ..Step::new(index)
+        };
+        Self((0..count).map(step).collect())
+    }
+
+    /// How many there are.
+    #[must_use]
+    pub const fn count(&self) -> u32 {
+        self.0.len() as u32
+    }
+
+    /// A place in the unit square for each ray, in parts of 2^32, to be shifted for each point.
+    pub fn places(&self) -> impl Iterator<Item = [u32; 2]> + '_ {
+        self.0.iter().map(|step| step.place)
+    }
+}
+
+/// Sides of surfaces that reflect, but that no light reaches: what sees one of them is dark, too.
+#[derive(Debug)]
+pub struct DarkSides(Vec<[bool; 2]>);
+
+impl DarkSides {
+    /// The sides that a mesh of the scene has left out.
+    #[must_use]
+    pub fn new(scene: &Scene, locator: &Locator) -> Self {
+        let surfaces = scene.surfaces().iter().zip(0..);
+        let is_dark = |surface: &Surface, number, side| {
+            let reflects = is_face(surface, side) && !surface.reflectance().is_black();
+            reflects && locator.face(number, side).is_none()
+        };
+        let sides = surfaces.map(|(surface, number)| {
+            [Side::Front, Side::Back].map(|side| is_dark(surface, number, side))
+        });
+        Self(sides.collect())
+    }
+
+    fn contains(&self, surface: u32, side: Side) -> bool {
+        let sides = self.0.get(surface as usize);
+        sides.is_some_and(|[front, back]| match side {
+            Side::Front => *front,
+            Side::Back => *back,
+        })
+    }
+}
+
 impl<'a> Rays<'a> {
     /// Rays through a mesh, its elements by place, and the surfaces that it was made of.
     #[must_use]
@@ -86,60 +156,88 @@ impl<'a> Rays<'a> {
         Self { mesh, bvh, locator }
     }
 
-    /// Where `count` cosine-weighted rays from a point of a polygon end, on the side of its front; the
-    /// `seed` turns them. `None` for a ray that escapes or is absorbed.
-    pub fn from_point(
-        &self,
+    /// Where cosine-weighted rays from a point of a polygon end, on the side of its front; the
+    /// `seed` shifts and turns them. `None` for a ray that escapes or is absorbed.
+    pub fn from_point<'r>(
+        &'r self,
         polygon: &Polygon,
         point: Vec3,
         seed: u64,
-        count: u32,
-    ) -> impl Iterator<Item = Option<End>> + '_ {
-        let [share, turn] = [0, 1].map(|axis| noise::bits(seed * 2 + axis));
-        let first = Vec2::from_angle(TAU * noise::fraction(turn));
-        let normal = polygon.normal();
-        let (x, y) = normal.any_orthonormal_pair();
+        fan: &'r Fan,
+    ) -> impl Iterator<Item = Option<End>> + 'r {
+        let first = Vec2::from_angle(TAU * noise::unit(seed));
+        let frame = Frame::new(polygon);
         let from = lifted(polygon, point);
-        let mut caster = self.bvh.caster();
-        (0..count).map(move |index| {
-            let step = Step::new(index);
-            let across = step.across(share, first);
-            let up = (1.0 - across.length_squared()).max(0.0).sqrt();
-            let direction = x * across.x + y * across.y + normal * up;
-            self.end(&mut caster, from, direction)
+        let mut caster = self.bvh.caster_from(from);
+        fan.0.iter().map(move |step| {
+            let direction = frame.direction(step.across(0, first));
+            self.end(caster.nearest(direction)?, from, direction)
         })
     }
 
+    /// Where one such ray ends; `None` when it escapes or is absorbed.
+    #[must_use]
+    pub fn one(&self, polygon: &Polygon, point: Vec3, seed: u64) -> Option<End> {
+        let [share, turn] = [0, 1].map(|axis| noise::unit(seed * 2 + axis));
+        let across = Vec2::from_angle(TAU * turn) * share.sqrt();
+        let direction = Frame::new(polygon).direction(across);
+        let from = lifted(polygon, point);
+        let hit = self.bvh.caster().nearest(from, direction)?;
+        self.end(hit, from, direction)
+    }
+
     /// Casts a ray for every step from an element, and notes where each ends.
-    fn cast(&self, polygon: &Polygon, id: u32, steps: &[Step], hits: &mut [u32]) {
+    fn cast(&self, polygon: &Polygon, id: u32, steps: &[Step], dark: &DarkSides, hits: &mut [u32]) {
         let [s, t, share, turn] = [0, 1, 2, 3].map(|axis| noise::bits(u64::from(id) * 4 + axis));
-        let normal = polygon.normal();
-        let (x, y) = normal.any_orthonormal_pair();
+        let frame = Frame::new(polygon);
         let first = Vec2::from_angle(TAU * noise::fraction(turn));
         let mut caster = self.bvh.caster();
         for (hit, step) in hits.iter_mut().zip(steps) {
             let place = [s.wrapping_add(step.place[0]), t.wrapping_add(step.place[1])];
             let (point, _) = from_unit_square(polygon, Vec2::from(place.map(noise::fraction)));
             let from = lifted(polygon, point);
-            let across = step.across(share, first);
-            let up = (1.0 - across.length_squared()).max(0.0).sqrt();
-            let direction = x * across.x + y * across.y + normal * up;
-            let end = self.end(&mut caster, from, direction);
-            *hit = end.map_or(NOTHING, |end| end.element);
+            let direction = frame.direction(step.across(share, first));
+            *hit = match caster.nearest(from, direction) {
+                None => NOTHING,
+                Some(met) if dark.contains(met.surface, met.side()) => DARK,
+                Some(met) => {
+                    let end = self.end(met, from, direction);
+                    end.map_or(NOTHING, |end| end.element)
+                }
+            };
         }
     }
 
-    /// Where a ray meets an element; `None` when it escapes or is absorbed.
-    fn end(&self, caster: &mut Caster, from: Vec3, direction: Vec3) -> Option<End> {
-        let met = caster.nearest(from, direction)?;
-        let side = if met.front { Side::Front } else { Side::Back };
-        let position = from + direction * met.distance;
-        let element = self.locator.element(met.surface, side, position)?;
+    /// The element that a ray met; `None` where it is absorbed.
+    fn end(&self, hit: Hit, from: Vec3, direction: Vec3) -> Option<End> {
+        let position = from + direction * hit.distance;
+        let element = self.locator.element(hit.surface, hit.side(), position)?;
         Some(End {
             element,
             position,
-            distance: met.distance,
+            distance: hit.distance,
         })
+    }
+}
+
+/// Directions about the normal of a polygon.
+struct Frame {
+    x: Vec3,
+    y: Vec3,
+    normal: Vec3,
+}
+
+impl Frame {
+    fn new(polygon: &Polygon) -> Self {
+        let normal = polygon.normal();
+        let (x, y) = normal.any_orthonormal_pair();
+        Self { x, y, normal }
+    }
+
+    /// The unit vector with these components across the normal, on its side.
+    fn direction(&self, across: Vec2) -> Vec3 {
+        let up = (1.0 - across.length_squared()).max(0.0).sqrt();
+        self.x * across.x + self.y * across.y + self.normal * up
     }
 }
 
@@ -167,7 +265,7 @@ impl Hits {
     }
 
     /// Casts [`RAYS_PER_PASS`] more rays from every element.
-    pub fn cast(&mut self, rays: &Rays) {
+    pub fn cast(&mut self, rays: &Rays, dark: &DarkSides) {
         let first = self.passes.len() as u32 * RAYS_PER_PASS;
         let steps: Vec<Step> = (first..)
             .take(RAYS_PER_PASS as usize)
@@ -180,10 +278,32 @@ impl Hits {
             .enumerate()
             .for_each(|(id, (hits, element))| {
                 if let Some(polygon) = mesh.element_polygon(element) {
-                    rays.cast(&polygon, id as u32, &steps, hits);
+                    rays.cast(&polygon, id as u32, &steps, dark, hits);
                 }
             });
         self.passes.push(hits);
+    }
+
+    /// The share of every element that light can reach, from [`LEAST_EXPOSED`] to 1.
+    #[must_use]
+    pub fn exposed(&self, elements: usize) -> Vec<f32> {
+        let per_pass = RAYS_PER_PASS as usize;
+        let share = 1.0 / (self.passes.len() * per_pass).max(1) as f32;
+        let exposed = |id: usize| {
+            let hits = self.passes.iter();
+            let hits = hits.flat_map(|pass| &pass[id * per_pass..(id + 1) * per_pass]);
+            let dark = hits.filter(|hit| **hit == DARK).count();
+            (1.0 - dark as f32 * share).max(LEAST_EXPOSED)
+        };
+        (0..elements).map(exposed).collect()
+    }
+
+    /// `rho / s` of every element.
+    fn reflected_shares(&self, mesh: &Mesh) -> Vec<Rgb> {
+        let exposed = self.exposed(mesh.elements.len());
+        let elements = mesh.elements.iter().zip(exposed);
+        let shares = elements.map(|(element, exposed)| element.reflectance * exposed.recip());
+        shares.collect()
     }
 
     /// All bounces of direct light, until the residual of every lane is `tolerance` of its first bounce.
@@ -196,9 +316,10 @@ impl Hits {
     ) -> Bounced<K> {
         let zero = vec![[[0.0; K]; 3]; direct.len()];
         let passes: Vec<&[u32]> = self.passes.iter().map(Vec::as_slice).collect();
+        let shares = self.reflected_shares(mesh);
         let mut reflected = zero.clone();
         let mut transport = |v: &[Lanes<K>], y: &mut [Lanes<K>]| {
-            reflect(mesh, v, &mut reflected);
+            reflect(&shares, v, &mut reflected);
             average(&passes, &reflected, y);
         };
         // x = T (D + x), so x - T x = T D.
@@ -231,7 +352,7 @@ impl Hits {
     pub fn noise<const K: usize>(&self, mesh: &Mesh, irradiance: &[Lanes<K>]) -> [f32; K] {
         let zero = vec![[[0.0; K]; 3]; irradiance.len()];
         let mut reflected = zero.clone();
-        reflect(mesh, irradiance, &mut reflected);
+        reflect(&self.reflected_shares(mesh), irradiance, &mut reflected);
         let [even, odd] = [0, 1].map(|parity| {
             let passes = self.passes.iter().skip(parity).step_by(2);
             let passes: Vec<&[u32]> = passes.map(Vec::as_slice).collect();
@@ -279,14 +400,13 @@ fn average<const K: usize>(passes: &[&[u32]], v: &[Lanes<K>], y: &mut [Lanes<K>]
     });
 }
 
-/// `y_j = rho_j v_j`.
-fn reflect<const K: usize>(mesh: &Mesh, v: &[Lanes<K>], y: &mut [Lanes<K>]) {
-    let values = y.par_iter_mut().zip(v).zip(mesh.elements);
-    values.for_each(|((y, v), element)| {
-        let reflectance = element.reflectance.to_array();
-        for ((y, v), rho) in y.iter_mut().zip(v).zip(reflectance) {
+/// `y_j = share_j v_j`.
+fn reflect<const K: usize>(shares: &[Rgb], v: &[Lanes<K>], y: &mut [Lanes<K>]) {
+    let values = y.par_iter_mut().zip(v).zip(shares);
+    values.for_each(|((y, v), share)| {
+        for ((y, v), share) in y.iter_mut().zip(v).zip(share.to_array()) {
             for (y, v) in y.iter_mut().zip(v) {
-                *y = rho * v;
+                *y = share * v;
             }
         }
     });

@@ -147,6 +147,7 @@ fn draft(solution: &Solution) -> Option<(Vec<usize>, Solution)> {
             .flat_map(|values| tags.iter().map(|tag| values[*tag]))
             .collect(),
         direct: None,
+        exposed: Vec::new(),
         method: solution.method,
         rows: solution.rows,
         spacing: solution.spacing,

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use relume::atlas::{
-    ESCAPE, FIRST_BITS, FULL_BITS, LARGEST_SIDE, LightEntry, PREDICTED, Place, places, predict,
+    ESCAPE, FIRST_BITS, FULL_BITS, LARGEST_SIDE, LightEntry, PREDICTED, Place, Predictor, places,
 };
 use relume::color::Rgb;
 use relume::mesh::{Element, Face};
@@ -149,27 +149,22 @@ fn tile(place: Place, first_bits: u32, planes: &[Vec<[u16; 3]>]) -> Vec<u8> {
 
 /// One of the three coded planes of a light; the first value of green takes `first_bits`.
 fn put_plane(coded: &[i32], columns: usize, first_bits: Option<u32>, bits: &mut BitWriter) {
-    let rest: Vec<u32> = (1..coded.len())
-        .map(|at| {
-            let (column, above) = (at % columns, at.checked_sub(columns));
-            let left = (column > 0).then(|| coded[at - 1]);
-            let corner = above
-                .filter(|_| column > 0)
-                .map_or(0, |above| coded[above - 1]);
-            fold(coded[at] - predict(left, above.map(|at| coded[at]), corner))
-        })
-        .collect();
-    let parameter = if rest.iter().all(|z| *z == 0) {
-        PREDICTED
+    let smallest = [Predictor::Edge, Predictor::Mean].map(|predictor| {
+        let rest = differences(coded, columns, predictor);
+        let cost = |m: &u32| rest.iter().map(|z| u64::from(rice_bits(*z, *m))).sum();
+        let costs = (0..PREDICTED).map(|m| (cost(&m), m));
+        let (bits, parameter): (u64, u32) = costs.min().unwrap_or_default();
+        (bits, parameter, predictor, rest)
+    });
+    let [edge, mean] = smallest;
+    let (_, parameter, predictor, rest) = if mean.0 < edge.0 { mean } else { edge };
+    let is_as_predicted = predictor == Predictor::Edge && rest.iter().all(|z| *z == 0);
+    if is_as_predicted {
+        bits.put(PREDICTED, 4);
     } else {
-        let cost = |m: &u32| {
-            rest.iter()
-                .map(|z| u64::from(rice_bits(*z, *m)))
-                .sum::<u64>()
-        };
-        (0..PREDICTED).min_by_key(cost).unwrap_or(0)
-    };
-    bits.put(parameter, 4);
+        bits.put(parameter, 4);
+        bits.put(u32::from(predictor == Predictor::Mean), 1);
+    }
     match first_bits {
         Some(count) => bits.put(coded[0] as u32, count),
         None => {
@@ -180,9 +175,23 @@ fn put_plane(coded: &[i32], columns: usize, first_bits: Option<u32>, bits: &mut 
             bits.put(first - (1 << below), below);
         }
     }
-    if parameter != PREDICTED {
+    if !is_as_predicted {
         rest.iter().for_each(|z| put_rice(*z, parameter, bits));
     }
+}
+
+/// What is left of all values but the first.
+fn differences(coded: &[i32], columns: usize, predictor: Predictor) -> Vec<u32> {
+    let rest = (1..coded.len()).map(|at| {
+        let column = at % columns;
+        let left = (column > 0).then(|| coded[at - 1]);
+        let above = at.checked_sub(columns).map(|above| {
+            let right = above + usize::from(column + 1 < columns);
+            [above - usize::from(column > 0), above, right].map(|at| coded[at])
+        });
+        fold(coded[at] - predictor.predict(left, above))
+    });
+    rest.collect()
 }
 
 /// `0, 1, 2, 3, 4, ...` from `0, -1, 1, -2, 2, ...`.

@@ -80,6 +80,7 @@ pub fn unpack(atlas: &Atlas) -> Result<Solution, TooLarge> {
             .collect(),
         contributions,
         direct: None,
+        exposed: Vec::new(),
         method: Method::default(),
         rows: 0,
         spacing: Spacing {

@@ -1,8 +1,8 @@
 //! Preview: a perspective picture of a relit scene.
 //!
 //! What is shown is radiance, `L = (rho E + M) / pi` in W/m2/sr: `rho` the reflectance of the
-//! element, `E` its irradiance (smoothed over the element, see `shading`) and `M` the exitance of
-//! its face. The picture is linear and unexposed, multiplied by its coverage (see `raster`).
+//! element, `E` its irradiance (smoothed over the element, see `shading`, or [`Gathered`] at every
+//! pixel) and `M` the exitance of its face. The picture is linear and unexposed, multiplied by its coverage (see `raster`).
 //!
 //! Sides without a face (unlit ones, which meshes leave out, and the backs of one-sided surfaces)
 //! are drawn black, so that they hide what is behind them. From outside the scene's bounding
@@ -19,6 +19,7 @@ mod tests;
 
 use std::collections::HashSet;
 
+use glam::Vec3;
 use relume::color::Rgb;
 use relume::geometry::Polygon;
 use relume::mesh::{Mesh, Side};
@@ -27,7 +28,9 @@ use tiny_skia::Pixmap;
 pub use camera::{Camera, CameraError, MAX_SIDE, Viewpoint};
 
 use crate::picture::{Exposure, LinearImage, PictureError, to_pixmap};
+use crate::probe::{Gatherer, Part};
 use fit::Bounds;
+use raster::View;
 use shading::Facet;
 
 /// A scene under one mix.
@@ -42,6 +45,27 @@ pub struct Relit<'a> {
     pub irradiance: &'a [Rgb],
     /// Emitted exitance of every face, W/m2; 0 for ordinary ones.
     pub exitance: &'a [Rgb],
+    /// Irradiance better than that of the elements, at every pixel of what stores any.
+    pub gathered: Option<Gathered<'a>>,
+}
+
+/// Light at points of a solution under one mix.
+#[derive(Clone, Copy, Debug)]
+pub struct Gathered<'a> {
+    /// What finds it.
+    pub gatherer: &'a Gatherer<'a>,
+    /// One weight for each light.
+    pub mix: &'a [Rgb],
+}
+
+impl Gathered<'_> {
+    /// Irradiance, W/m2, at the point of a side nearest to a position; `seed` turns the rays.
+    fn irradiance(&self, (surface, side): (u32, Side), position: Vec3, seed: u64) -> Option<Rgb> {
+        let spot = self.gatherer.spot(surface, side, position)?;
+        let values = self.gatherer.irradiance(spot, Part::Total, seed);
+        let lights = self.mix.iter().zip(values);
+        Some(lights.fold(Rgb::BLACK, |sum, (weight, value)| sum + *weight * value))
+    }
 }
 
 /// Why no picture was made.
@@ -152,10 +176,16 @@ impl Relit<'_> {
 /// [`PreviewError::Length`].
 pub fn render(relit: &Relit, camera: &Camera, brightest: f32) -> Result<LinearImage, PreviewError> {
     relit.check()?;
-    Ok(raster::paint(camera, &relit.facets(camera), brightest))
+    let view = View {
+        camera,
+        facets: &relit.facets(camera),
+        gathered: relit.gathered,
+    };
+    Ok(raster::paint(view, brightest))
 }
 
-/// The picture as a screen shows it, over a background in sRGB codes, and the exposure it got.
+/// The picture as a screen shows it, over a background in sRGB codes, and the exposure it got, which
+/// [`Exposure::Auto`] takes from the irradiance of the elements.
 ///
 /// # Errors
 /// [`PreviewError`].
@@ -166,11 +196,21 @@ pub fn show(
     background: [u8; 3],
 ) -> Result<(Pixmap, f32), PreviewError> {
     relit.check()?;
-    let facets = relit.facets(camera);
+    let view = View {
+        camera,
+        facets: &relit.facets(camera),
+        gathered: relit.gathered,
+    };
     let factor = match exposure {
-        Exposure::Auto => exposure.factor(&raster::paint(camera, &facets, f32::INFINITY)),
+        Exposure::Auto => {
+            let smoothed = View {
+                gathered: None,
+                ..view
+            };
+            exposure.factor(&raster::paint(smoothed, f32::INFINITY))
+        }
         Exposure::Factor(factor) => factor,
     };
-    let image = raster::paint(camera, &facets, factor.recip());
+    let image = raster::paint(view, factor.recip());
     Ok((to_pixmap(&image, factor, background)?, factor))
 }

@@ -23,6 +23,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use relume::color::Rgb;
 
+use super::Gathered;
 use super::camera::Camera;
 use super::shading::Facet;
 use crate::picture::LinearImage;
@@ -160,16 +161,26 @@ struct Sample {
     facet: u32,
 }
 
-/// Paints facets whose fronts face the eye. Samples brighter than `brightest` (W/m2/sr, per
-/// channel) count as that bright.
-pub(super) fn paint(camera: &Camera, facets: &[Facet], brightest: f32) -> LinearImage {
-    let outlines: Vec<Outline> = facets
+/// What is painted.
+#[derive(Clone, Copy)]
+pub(super) struct View<'a> {
+    pub(super) camera: &'a Camera,
+    /// Their fronts face the eye.
+    pub(super) facets: &'a [Facet],
+    /// Where irradiance comes from, unless it is that of the facets.
+    pub(super) gathered: Option<Gathered<'a>>,
+}
+
+/// Paints a picture. Samples brighter than `brightest` (W/m2/sr, per channel) count as that bright.
+pub(super) fn paint(view: View, brightest: f32) -> LinearImage {
+    let outlines: Vec<Outline> = view
+        .facets
         .iter()
         .zip(0..NOTHING)
-        .filter_map(|(facet, number)| Outline::new(camera, facet, number))
+        .filter_map(|(facet, number)| Outline::new(view.camera, facet, number))
         .collect();
 
-    let (width, height) = camera.size();
+    let (width, height) = view.camera.size();
     let mut image = LinearImage::empty(width, height);
     let bands = image.pixels.par_chunks_mut((width * BAND) as usize);
     bands
@@ -181,7 +192,7 @@ pub(super) fn paint(camera: &Camera, facets: &[Facet], brightest: f32) -> Linear
             for (pixel, place) in pixels.iter_mut().zip(0..) {
                 let (x, y) = (place % width, place / width);
                 let own = |row: u32| samples[((y * SAMPLES + row) * width + x) as usize].facet;
-                *pixel = resolve(camera, facets, brightest, [x, top + y], own);
+                *pixel = resolve(view, brightest, [x, top + y], own);
             }
         });
     image
@@ -218,13 +229,7 @@ fn visible(outlines: &[Outline], rows: Range<u32>, width: u32) -> Vec<Sample> {
 }
 
 /// A pixel from the facets that its samples see: premultiplied colour and coverage.
-fn resolve(
-    camera: &Camera,
-    facets: &[Facet],
-    brightest: f32,
-    [x, y]: [u32; 2],
-    facet_of: impl Fn(u32) -> u32,
-) -> [f32; 4] {
+fn resolve(view: View, brightest: f32, pixel: [u32; 2], facet_of: impl Fn(u32) -> u32) -> [f32; 4] {
     let seen: [u32; SAMPLES as usize] = std::array::from_fn(|row| facet_of(row as u32));
     let mut sum = Rgb::BLACK;
     let mut covered = 0;
@@ -233,7 +238,7 @@ fn resolve(
             continue;
         }
         let (count, at) = mean_place(&seen, *facet);
-        let radiance = radiance(camera, &facets[*facet as usize], x, y, at);
+        let radiance = radiance(view, &view.facets[*facet as usize], pixel, at);
         sum += radiance.map(|c| c.min(brightest)) * count as f32;
         covered += count;
     }
@@ -252,11 +257,14 @@ fn mean_place(seen: &[u32], facet: u32) -> (u32, [f64; 2]) {
 }
 
 /// Radiance of a facet where the ray through a place of a pixel meets it.
-fn radiance(camera: &Camera, facet: &Facet, x: u32, y: u32, at: [f64; 2]) -> Rgb {
+fn radiance(view: View, facet: &Facet, [x, y]: [u32; 2], at: [f64; 2]) -> Rgb {
+    let camera = view.camera;
     let ray = camera.ray(f64::from(x) + at[0], f64::from(y) + at[1]);
     let normal = facet.polygon.normal().as_dvec3();
     let from_eye = camera.towards(facet.polygon.origin());
     let depth = normal.dot(from_eye) / normal.dot(ray);
     let offset = ray * depth - from_eye;
-    facet.radiance(facet.polygon.origin() + offset.as_vec3())
+    let number = u64::from(y) * u64::from(camera.size().0) + u64::from(x);
+    let point = facet.polygon.origin() + offset.as_vec3();
+    facet.radiance(point, view.gathered, number)
 }

@@ -11,12 +11,15 @@
 //! show a step.
 
 use std::collections::HashMap;
+use std::ops::{Add, Mul, Sub};
 
 use glam::{DVec3, I64Vec3, Vec2, Vec3};
 use relume::color::Rgb;
 use relume::geometry::Polygon;
-use relume::mesh::Mesh;
+use relume::mesh::{Mesh, Side};
 use relume::tone;
+
+use super::Gathered;
 
 /// Two corners are one node when they are nearer than this, in largest coordinates of the scene:
 /// what files written with six digits need.
@@ -38,6 +41,8 @@ pub(super) struct Facet {
     pub(super) exitance: Rgb,
     /// Whether it belongs to a lamp, lit or not: what is drawn must not depend on the mix.
     pub(super) is_lamp: bool,
+    /// The surface and side that it is a part of, if light was stored there.
+    pub(super) side: Option<(u32, Side)>,
 }
 
 impl Facet {
@@ -58,6 +63,7 @@ impl Facet {
             reflectance: Rgb::BLACK,
             exitance: Rgb::BLACK,
             is_lamp: false,
+            side: None,
         }
     }
 
@@ -66,19 +72,42 @@ impl Facet {
         self.reflectance == Rgb::BLACK && !self.is_lamp
     }
 
-    /// Radiance `(rho E + M) / pi` at a point of the polygon, W/m2/sr.
-    pub(super) fn radiance(&self, point: Vec3) -> Rgb {
+    /// Radiance `(rho E + M) / pi` at a point of the polygon, W/m2/sr; `E` is gathered where that is
+    /// asked for, with rays that the `seed` turns.
+    pub(super) fn radiance(&self, point: Vec3, gathered: Option<Gathered>, seed: u64) -> Rgb {
         let at = self.polygon.parameters(point);
         let at = at.clamp(Vec2::ZERO, Vec2::ONE); // widened outlines reach a little beyond
-        let [a, b, c, d] = self.irradiance;
-        let irradiance = if self.polygon.is_triangle() {
+        let gathered = self.side.zip(gathered).and_then(|(side, gathered)| {
+            gathered.irradiance(side, self.blend(at, self.corners()), seed)
+        });
+        let irradiance = gathered.unwrap_or_else(|| self.blend(at, self.irradiance));
+        tone::radiance(self.reflectance, irradiance, self.exitance)
+    }
+
+    /// The vertices; a triangle's fourth is its third again.
+    fn corners(&self) -> [Vec3; 4] {
+        let vertices = self.polygon.vertices();
+        [0, 1, 2, 3].map(|corner| {
+            vertices
+                .get(corner)
+                .or(vertices.last())
+                .copied()
+                .unwrap_or_default()
+        })
+    }
+
+    /// Between values at the corners: linear over a triangle, bilinear over a quad.
+    fn blend<T>(&self, at: Vec2, [a, b, c, d]: [T; 4]) -> T
+    where
+        T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f32, Output = T>,
+    {
+        if self.polygon.is_triangle() {
             a + (b - a) * at.x + (c - a) * at.y
         } else {
             let low = a + (b - a) * at.x;
             let high = d + (c - d) * at.x;
             low + (high - low) * at.y
-        };
-        tone::radiance(self.reflectance, irradiance, self.exitance)
+        }
     }
 }
 
@@ -93,13 +122,15 @@ pub(super) fn facets(mesh: &Mesh, irradiance: &[Rgb], exitance: &[Rgb]) -> Vec<O
     let parts = mesh.elements.iter().zip(polygons).zip(corners);
     parts
         .map(|((element, polygon), corners)| {
-            let face = mesh.patches.get(element.patch as usize)?.face;
+            let number = mesh.patches.get(element.patch as usize)?.face as usize;
+            let face = mesh.faces.get(number)?;
             Some(Facet {
                 polygon: polygon?,
                 irradiance: corners,
                 reflectance: element.reflectance,
-                exitance: *exitance.get(face as usize)?,
-                is_lamp: mesh.faces.get(face as usize)?.emission.is_some(),
+                exitance: *exitance.get(number)?,
+                is_lamp: face.emission.is_some(),
+                side: Some((face.surface, face.side)),
             })
         })
         .collect()

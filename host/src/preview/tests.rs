@@ -78,6 +78,7 @@ impl Stage {
             surfaces: &self.surfaces,
             irradiance: &self.irradiance,
             exitance: &self.parts.faces.iter().map(exitance).collect::<Vec<_>>(),
+            gathered: None,
         };
         render(&relit, camera, brightest).unwrap()
     }
@@ -204,6 +205,7 @@ fn a_dark_room_is_tight_too() {
         surfaces: &surfaces,
         irradiance: &[],
         exitance: &[],
+        gathered: None,
     };
     for step in 0..24_u8 {
         let angle = f32::from(step) * 0.53;
@@ -384,7 +386,7 @@ fn small_elements_meet_a_large_neighbour_without_a_step() {
     stage.irradiance = [1.0, 9.0, 4.0, 2.0, 7.0, 3.0].map(Rgb::splat).to_vec();
 
     let facets = shading::facets(&stage.mesh(), &stage.irradiance, &[Rgb::BLACK]);
-    let at = |element: usize, p: Vec3| facets[element].as_ref().unwrap().radiance(p).r;
+    let at = |element: usize, p: Vec3| facets[element].as_ref().unwrap().radiance(p, None, 0).r;
     for step in 0..=40_u8 {
         let y = f32::from(step) / 40.0;
         let right = match y {
@@ -491,6 +493,7 @@ fn unlit_sides_hide_from_inside_and_vanish_from_outside() {
         surfaces: &[],
         irradiance: &stage.irradiance,
         exitance: &exitance,
+        gathered: None,
     };
     let view = camera(Vec3::Z * 1.9, Vec3::ZERO, 0.5, 9, 9);
     assert_eq!(render(&relit, &view, 1e9).unwrap(), inside);
@@ -533,6 +536,7 @@ fn wrong_lengths_are_refused() {
         surfaces: &stage.surfaces,
         irradiance: &[],
         exitance: &[Rgb::BLACK],
+        gathered: None,
     };
     let view = camera(Vec3::Z, Vec3::ZERO, 1.0, 4, 4);
     let error = render(&relit, &view, 1.0).unwrap_err().to_string();

@@ -6,6 +6,8 @@
 //! one-sided surface, which reflects nothing; a side of reflectance 0 is not stored and gives no value.
 
 mod gather;
+mod lamp;
+mod radiant;
 
 use std::io;
 
@@ -18,7 +20,8 @@ use thiserror::Error;
 
 use crate::mesh::Locator;
 use crate::solution::Solution;
-use gather::Gatherer;
+pub use gather::Gatherer;
+pub use lamp::Spot;
 
 /// Reach of a surface, in diagonals of the bounding box.
 const REACH: f32 = 1e-3;
@@ -190,7 +193,14 @@ pub fn probe_points(
     })
 }
 
-/// The same, with direct light evaluated exactly at every point and indirect light gathered there.
+/// Rays that gather light at a point, by default.
+pub const RAYS: u32 = 2048;
+
+/// Most of them.
+pub const MOST_RAYS: i64 = 1 << 20;
+
+/// The same, with direct light evaluated exactly at every point and indirect light gathered there by
+/// so many rays.
 ///
 /// # Errors
 /// [`ProbeError::NoMesh`].
@@ -198,12 +208,13 @@ pub fn probe_gathered(
     solution: &Solution,
     points: &[ProbePoint],
     part: Part,
+    rays: u32,
 ) -> Result<Probed, ProbeError> {
     if solution.mesh.faces.is_empty() {
         return Err(ProbeError::NoMesh);
     }
     let places = Places::new(solution);
-    let gatherer = Gatherer::new(solution);
+    let gatherer = Gatherer::new(solution, rays).with_exact_far_patches();
     let values: Vec<Option<Vec<Rgb>>> = points
         .par_iter()
         .enumerate()

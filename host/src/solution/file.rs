@@ -1,7 +1,7 @@
 //! The bytes of a `.solution` file.
 //!
 //! Version 1, little-endian: `RELUMESO`, `u16` version, `u16` flags (1: direct light is kept
-//! apart; the others are 0), five `u32` counts (surfaces, faces, patches, elements, lights), `u32` rows evaluated,
+//! apart, 2: bounces were found by rows, 4: light cannot reach all of some elements; the others are 0), five `u32` counts (surfaces, faces, patches, elements, lights), `u32` rows evaluated,
 //! `2 f32` spacing (patch, element); then
 //!
 //! | part | each |
@@ -14,6 +14,7 @@
 //! | luminaires | `u32` light, `3 f32` share, `u32` kind (0 point, 1 smooth spot, 2 linear spot, 3 sun, 4 sky), `3 f32` position, `3 f32` direction, `2 f32` angles (inner and outer, or diameter); 0 where the kind has none |
 //! | contributions | `3 f32` per element and light, light inside |
 //! | direct part | likewise, with flag 1 |
+//! | exposed shares | `f32` per element, with flag 4; 1 without |
 //!
 //! Faces stand in the order of their surfaces, front before back, and without a light their share is
 //! 0; patches and elements stand face by face, each face's elements where it says.
@@ -36,6 +37,7 @@ pub const MAGIC: [u8; 8] = *b"RELUMESO";
 const VERSION: u16 = 1;
 const HAS_DIRECT: u16 = 1;
 const HAS_ROWS: u16 = 2;
+const HAS_EXPOSED: u16 = 4;
 const POINT: u32 = 0;
 const SMOOTH_SPOT: u32 = 1;
 const LINEAR_SPOT: u32 = 2;
@@ -85,6 +87,9 @@ pub fn write(solution: &Solution) -> Vec<u8> {
     if solution.method != Method::Gather {
         flags |= HAS_ROWS;
     }
+    if !solution.exposed.is_empty() {
+        flags |= HAS_EXPOSED;
+    }
     output.0.extend(VERSION.to_le_bytes());
     output.0.extend(flags.to_le_bytes());
     for count in [
@@ -116,6 +121,9 @@ pub fn write(solution: &Solution) -> Vec<u8> {
         .chain(solution.direct.iter().flatten())
     {
         output.rgb(*value);
+    }
+    if !solution.exposed.is_empty() {
+        output.f32s(&solution.exposed);
     }
     output.u32(CRC.checksum(&output.0));
     output.0
@@ -226,7 +234,7 @@ pub fn read(bytes: &[u8]) -> Result<Solution, FileError> {
         return Err(FileError::Version(version));
     }
     let flags = u16::from_le_bytes(input.take()?);
-    if flags & !(HAS_DIRECT | HAS_ROWS) != 0 {
+    if flags & !(HAS_DIRECT | HAS_ROWS | HAS_EXPOSED) != 0 {
         let index = usize::from(flags);
         return Err(FileError::Illegal {
             what: "flags",
@@ -259,6 +267,14 @@ pub fn read(bytes: &[u8]) -> Result<Solution, FileError> {
     } else {
         Some(input.table("direct light", values, 12, Input::legal_rgb)?)
     };
+    let exposed = if flags & HAS_EXPOSED == 0 {
+        Vec::new()
+    } else {
+        input.table("exposed shares", counts.elements, 4, |input| {
+            let share = input.f32()?;
+            Ok(Some(share).filter(|share| *share > 0.0 && *share <= 1.0))
+        })?
+    };
 
     input.part = "checksum";
     let covered = bytes.len() - input.rest.len();
@@ -277,6 +293,7 @@ pub fn read(bytes: &[u8]) -> Result<Solution, FileError> {
         lights,
         contributions,
         direct,
+        exposed,
         method: if flags & HAS_ROWS == 0 {
             Method::Gather
         } else {
@@ -542,7 +559,9 @@ mod tests {
     #[test]
     fn what_was_written_is_read() {
         for split_direct in [false, true] {
-            let solution = sample(split_direct);
+            let mut solution = sample(split_direct);
+            assert_eq!(read(&write(&solution)).as_ref(), Ok(&solution));
+            solution.exposed[3] = 0.25;
             assert_eq!(read(&write(&solution)), Ok(solution));
         }
     }
@@ -583,7 +602,7 @@ mod tests {
             .position(|f| f.emission.is_none());
         let unlit = faces + 32 * black.unwrap();
         for (at, value, what, index) in [
-            (10, [4, 0, 0, 0], "flags", 4),
+            (10, [8, 0, 0, 0], "flags", 8),
             (faces, [200, 0, 0, 0], "faces", 0),
             (faces + 4, [2, 0, 0, 0], "faces", 0),
             (faces + 24, [1, 0, 0, 0], "faces", 0),

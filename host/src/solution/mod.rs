@@ -83,6 +83,9 @@ pub struct Solution {
     pub contributions: Vec<Rgb>,
     /// The direct part of it, where it was kept apart.
     pub direct: Option<Vec<Rgb>>,
+    /// Share of each element that light can reach: what is seen of it is lit by so much more. Empty
+    /// where that was not looked for: all can be reached then.
+    pub exposed: Vec<f32>,
     /// How the bounces were found.
     pub method: Method,
     /// Rows that the bake evaluated, and passes of rays.
@@ -92,6 +95,12 @@ pub struct Solution {
 }
 
 impl Solution {
+    /// Share of an element that light can reach.
+    #[must_use]
+    pub fn exposed(&self, element: usize) -> f32 {
+        self.exposed.get(element).copied().unwrap_or(1.0)
+    }
+
     /// How many elements there are: those of the mesh, or pixels.
     #[must_use]
     pub fn element_count(&self) -> usize {

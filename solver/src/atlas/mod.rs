@@ -41,8 +41,8 @@ use glam::Vec2;
 
 pub use read::{Atlas, AtlasMesh};
 pub use tiles::{
-    Block, ESCAPE, FIRST_BITS, FULL_BITS, LARGEST_SIDE, PREDICTED, Place, TileBits, Tiles, places,
-    predict,
+    Block, ESCAPE, FIRST_BITS, FULL_BITS, LARGEST_SIDE, PREDICTED, Place, Predictor, TileBits,
+    Tiles, places,
 };
 pub use write::{Contents, LightEntry, size, write};
 

@@ -3,11 +3,12 @@
 //! Elements stand in *grids* of `width` columns, row by row; a grid is cut into tiles of `side x side`
 //! elements (fewer at its end), a grid of one row into tiles of `side^2` elements. A tile holds, light after light, what every one of its elements gets:
 //! `g`, then `r - g`, then `b - g`, of whole-number codes `r, g, b` in common steps, so that the same hue
-//! costs nothing. Each of the three is predicted from its left neighbour `a`, the upper `b` and the upper left `c`
-//! (Weinberger, Seroussi and Sapiro 2000, LOCO-I, eq. 1): `min(a, b)` if `c >= max(a, b)`,
-//! `max(a, b)` if `c <= min(a, b)`, else the plane `a + b - c`. What is left, `e`, is written as
-//! `z = 2 e` or `-2 e - 1`: `z >> m` ones, a zero, and the lower `m` bits (Rice 1979), `m` once per tile, light and
-//! channel.
+//! costs nothing. Each of the three is predicted from its left neighbour `a`, the upper `b`, the upper left `c` and the
+//! upper right `d`, in one of two ways ([`Predictor`]). Where light has edges (Weinberger, Seroussi and Sapiro 2000, LOCO-I,
+//! eq. 1): `min(a, b)` if `c >= max(a, b)`, `max(a, b)` if `c <= min(a, b)`, else the plane `a + b - c`. Where it is
+//! rough: the mean `(2 a + b + d) / 4`, rounded. What is left, `e`, is written as
+//! `z = 2 e` or `-2 e - 1`: `z >> m` ones, a zero, and the lower `m` bits (Rice 1979), `m` and the predictor once per tile,
+//! light and channel.
 //!
 //! Little-endian, lengths in bytes, `g` grids, `t` tiles (which follow from grids and side):
 //!
@@ -23,7 +24,7 @@
 //! | | the bits, highest first |
 //!
 //! Bits of a tile: for every light in tiles one bit, 0 when all its codes are 0 here. Else for `g`, `r - g`, `b - g`: four
-//! bits `m`, 15 when all is as predicted; the first value (`g` itself in its bits; of the others `z` as
+//! bits `m`, 15 when all is as the first predictor has it, else one bit more for the predictor (1: the mean); the first value (`g` itself in its bits; of the others `z` as
 //! ones, as many as `(z + 8) >> 3` has bits but one, a zero, and the bits of `z + 8` below its highest); then, unless `m = 15`,
 //! the others: [`ESCAPE`] ones stand before 18 bits of `z` itself. Bits past the end are 0.
 
@@ -234,12 +235,23 @@ impl TileBits<'_> {
         // What is coded is kept in the block until all three are known; differences wrap.
         for channel in [1, 0, 2] {
             let parameter = self.bits.take(4);
+            let predictor = if parameter != PREDICTED && self.bits.take(1) == 1 {
+                Predictor::Mean
+            } else {
+                Predictor::Edge
+            };
             let first = if channel == 1 {
                 self.bits.take(first_bits) as i32
             } else {
                 unfold(self.bits.take_first())
             };
-            decode_plane(&mut self.bits, parameter, first, block, channel, columns);
+            let plane = Plane {
+                parameter,
+                predictor,
+                channel,
+                columns,
+            };
+            plane.decode(&mut self.bits, first, block);
         }
         for codes in block {
             let [r, g, b] = codes.map(|code| i32::from(code as i16));
@@ -256,43 +268,45 @@ impl TileBits<'_> {
     }
 }
 
-/// One of the three coded planes.
-fn decode_plane(
-    bits: &mut Bits,
+/// How one of the three coded planes is written.
+struct Plane {
     parameter: u32,
-    first: i32,
-    block: &mut [[u16; 3]],
+    predictor: Predictor,
     channel: usize,
     columns: usize,
-) {
-    let read = |block: &[[u16; 3]], at: Option<usize>| {
-        let codes = at.and_then(|at| block.get(at));
-        let code = codes.and_then(|codes| codes.get(channel)).copied();
-        signed(code.unwrap_or(0), channel)
-    };
-    for at in 0..block.len() {
-        let value = if at == 0 {
-            first
-        } else {
-            let column = at % columns.max(1);
-            let above = at.checked_sub(columns);
-            let left = (column > 0).then(|| at - 1);
-            let corner = above
-                .filter(|_| column > 0)
-                .and_then(|above| above.checked_sub(1));
-            let left = left.map(|at| read(block, Some(at)));
-            let above = above.map(|at| read(block, Some(at)));
-            let expected = predict(left, above, read(block, corner));
-            let rest = if parameter == PREDICTED {
-                0
+}
+
+impl Plane {
+    fn decode(&self, bits: &mut Bits, first: i32, block: &mut [[u16; 3]]) {
+        let columns = self.columns.max(1);
+        for at in 0..block.len() {
+            let value = if at == 0 {
+                first
             } else {
-                unfold(bits.take_rice(parameter))
+                let column = at % columns;
+                let left = (column > 0).then(|| self.read(block, at - 1));
+                let above = at.checked_sub(columns).map(|above| {
+                    let left = above - usize::from(column > 0);
+                    let right = above + usize::from(column + 1 < columns);
+                    [left, above, right].map(|at| self.read(block, at))
+                });
+                let rest = if self.parameter == PREDICTED {
+                    0
+                } else {
+                    unfold(bits.take_rice(self.parameter))
+                };
+                self.predictor.predict(left, above).wrapping_add(rest)
             };
-            expected.wrapping_add(rest)
-        };
-        if let Some(code) = block.get_mut(at).and_then(|codes| codes.get_mut(channel)) {
-            *code = value as u16;
+            let codes = block.get_mut(at);
+            if let Some(code) = codes.and_then(|codes| codes.get_mut(self.channel)) {
+                *code = value as u16;
+            }
         }
+    }
+
+    fn read(&self, block: &[[u16; 3]], at: usize) -> i32 {
+        let code = block.get(at).and_then(|codes| codes.get(self.channel));
+        signed(code.copied().unwrap_or(0), self.channel)
     }
 }
 
@@ -305,22 +319,41 @@ const fn signed(code: u16, channel: usize) -> i32 {
     }
 }
 
-/// What a value is expected to be, from its neighbours to the left, above, and above to the left.
-#[must_use]
-pub fn predict(left: Option<i32>, above: Option<i32>, corner: i32) -> i32 {
-    match (left, above) {
-        (Some(left), Some(above)) => {
-            let (low, high) = (left.min(above), left.max(above));
-            if corner >= high {
-                low
-            } else if corner <= low {
-                high
-            } else {
-                left + above - corner
+/// What a value is expected to be from its neighbours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Predictor {
+    /// The plane through the neighbours, but no more than an edge has.
+    Edge,
+    /// Their mean.
+    Mean,
+}
+
+impl Predictor {
+    /// From the neighbour to the left, and those above: to the left, straight above, and to the right, the
+    /// middle one in place of one that is not there.
+    #[must_use]
+    pub const fn predict(self, left: Option<i32>, above: Option<[i32; 3]>) -> i32 {
+        match (left, above, self) {
+            (Some(left), Some([corner, above, _]), Self::Edge) => {
+                let (low, high) = if left < above {
+                    (left, above)
+                } else {
+                    (above, left)
+                };
+                if corner >= high {
+                    low
+                } else if corner <= low {
+                    high
+                } else {
+                    left + above - corner
+                }
             }
+            (Some(left), Some([_, above, right]), Self::Mean) => {
+                (2 * left + above + right + 2) >> 2
+            }
+            (Some(only), None, _) | (None, Some([_, only, _]), _) => only,
+            (None, None, _) => 0,
         }
-        (Some(only), None) | (None, Some(only)) => only,
-        (None, None) => 0,
     }
 }
 

@@ -92,6 +92,7 @@ pub fn first_lights(solution: &Solution, count: usize) -> Solution {
             .copied()
             .collect(),
         direct: None,
+        exposed: Vec::new(),
         method: solution.method,
         rows: solution.rows,
         spacing: solution.spacing,
