@@ -21,7 +21,11 @@ fn main() {
     if is_small {
         println!("cargo:rustc-cfg=small");
     }
-    let (flash, ram) = if is_small { ("256K", "16K") } else { ("4M", "192K") };
+    let (flash, ram) = if is_small {
+        ("256K", "16K")
+    } else {
+        ("4M", "192K")
+    };
     let memory = format!(
         "MEMORY {{\n  FLASH : ORIGIN = 0x00000000, LENGTH = {flash}\n  RAM : ORIGIN = 0x20000000, LENGTH = {ram}\n}}\n"
     );

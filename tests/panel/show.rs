@@ -14,33 +14,13 @@ use embedded_graphics::pixelcolor::raw::{LittleEndian, RawU16};
 use embedded_graphics::pixelcolor::{Rgb565, Rgb888};
 use embedded_graphics::prelude::*;
 use relume::atlas::Atlas;
-use relume_panel::{Memory, Panel, SCREEN, slider};
+use relume_panel::{EVENING, Memory, Panel, SCREEN};
 
 use film::Film;
 
 /// The framebuffer of the display.
 type Screen =
     Framebuffer<Rgb565, RawU16, LittleEndian, 320, 240, { buffer_size::<Rgb565>(320, 240) }>;
-
-/// What a finger does.
-enum Touch {
-    /// A tap on the picture or on a slider.
-    Tap(Point),
-    /// A drag along the slider of a lamp, to a share of its length in per cent.
-    Drag(usize, i32),
-}
-
-/// Touches of an evening.
-const EVENING: [Touch; 8] = [
-    Touch::Tap(Point::new(31, 51)),
-    Touch::Tap(slider(2).top_left),
-    Touch::Drag(3, 70),
-    Touch::Tap(slider(4).top_left),
-    Touch::Drag(0, 65),
-    Touch::Tap(slider(5).top_left),
-    Touch::Drag(2, 35),
-    Touch::Tap(Point::new(291, 67)),
-];
 
 /// Hundredths of a second that a frame of a fade is seen, and its end.
 const FADING: u16 = 8;
@@ -63,10 +43,7 @@ fn main() -> Result<()> {
     let mut evening = Film::new(SCREEN.size);
     evening.add(shot(&panel), RESTING);
     for touch in EVENING {
-        match touch {
-            Touch::Tap(at) => panel.tap(at),
-            Touch::Drag(lamp, share) => panel.drag(along(lamp, share)),
-        }
+        panel.touch(touch);
         while panel.tick()? {
             evening.add(shot(&panel), FADING);
         }
@@ -84,16 +61,6 @@ fn main() -> Result<()> {
         film.len()
     );
     Ok(())
-}
-
-/// A place on a slider.
-fn along(lamp: usize, share: i32) -> Point {
-    let slider = slider(lamp);
-    let length = slider.size.width as i32 - 1;
-    Point::new(
-        slider.top_left.x + (length * share + 99) / 100,
-        slider.center().y,
-    )
 }
 
 /// The screen as it is now.

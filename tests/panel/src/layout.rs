@@ -54,3 +54,11 @@ pub(crate) fn level_at(at: Point) -> Option<(usize, u8)> {
     let along = at.x - slider(lamp).top_left.x;
     Some((lamp, (along * 100 / (SLIDER.width as i32 - 1)) as u8))
 }
+
+/// The place of a level in per cent on a slider.
+pub(crate) const fn level_place(lamp: usize, level: i32) -> Point {
+    let Rectangle { top_left, size } = slider(lamp);
+    // Rounded up: whatever is cut off there, the level is found again.
+    let along = (level * (size.width as i32 - 1) + 99) / 100;
+    Point::new(top_left.x + along, top_left.y + size.height as i32 / 2)
+}

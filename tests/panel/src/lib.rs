@@ -26,6 +26,8 @@ mod picture;
 
 mod controls;
 
+mod evening;
+
 use embedded_graphics::draw_target::DrawTarget;
 use embedded_graphics::geometry::{Point, Size};
 use embedded_graphics::pixelcolor::Rgb565;
@@ -33,6 +35,7 @@ use relume::atlas::Atlas;
 use relume::color::Rgb;
 use relume::relight::{FixedMix, FixedTable, FixedWeight, RelightError, table_length};
 
+pub use evening::EVENING;
 pub use lamp::{LAMPS, Lamp, ROOMS};
 pub use layout::{PICTURE, SCREEN, slider};
 pub use tone::EXPOSURE;
@@ -69,6 +72,15 @@ impl Default for Memory {
     fn default() -> Self {
         Self::new()
     }
+}
+
+/// What a finger does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Touch {
+    /// A tap: toggles the lamp that it hits, in the picture or on its slider.
+    Tap(Point),
+    /// A finger that moves along a slider: dims its lamp to the level under it.
+    Drag(Point),
 }
 
 /// The panel: lamps, their state, and the picture of the flat.
@@ -118,19 +130,21 @@ impl<'a> Panel<'a> {
         &self.lamps
     }
 
-    /// A tap: toggles the lamp that it hits, in the picture or on its slider.
-    pub fn tap(&mut self, at: Point) {
-        if let Some(lamp) = layout::lamp_at(at).and_then(|lamp| self.lamps.get_mut(lamp)) {
-            lamp.toggle();
-        }
-    }
-
-    /// A finger that moves along a slider: sets its lamp to the level under it.
-    pub fn drag(&mut self, at: Point) {
-        if let Some((lamp, level)) = layout::level_at(at)
-            && let Some(lamp) = self.lamps.get_mut(lamp)
-        {
-            lamp.set(level);
+    /// Does what a finger asks for; lamps fade there by [`Panel::tick`].
+    pub fn touch(&mut self, touch: Touch) {
+        match touch {
+            Touch::Tap(at) => {
+                if let Some(lamp) = layout::lamp_at(at).and_then(|lamp| self.lamps.get_mut(lamp)) {
+                    lamp.toggle();
+                }
+            }
+            Touch::Drag(at) => {
+                if let Some((lamp, level)) = layout::level_at(at)
+                    && let Some(lamp) = self.lamps.get_mut(lamp)
+                {
+                    lamp.set(level);
+                }
+            }
         }
     }
 
