@@ -109,7 +109,8 @@ impl Lamp {
     pub(crate) fn fade(&mut self) -> bool {
         let goal = if self.is_on { self.level } else { 0 };
         let before = self.shown;
-        self.shown = goal.clamp(before.saturating_sub(FADE), before + FADE);
+        let (least, most) = (before.saturating_sub(FADE), before.saturating_add(FADE));
+        self.shown = goal.max(least).min(most);
         self.shown != before
     }
 
