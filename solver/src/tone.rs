@@ -116,7 +116,7 @@ impl Encode for Rgb565Table {
     #[inline(always)]
     fn encode(&self, [r, g, b]: [u32; 3]) -> u16 {
         let [r, b] = [r, b].map(|step| step_of(&self.five, step));
-        r << 11 | step_of(&self.six, g) << 5 | b
+        b | step_of(&self.six, g) << 5 | r << 11
     }
 }
 

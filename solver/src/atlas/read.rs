@@ -288,6 +288,11 @@ impl<'a> Atlas<'a> {
         }
     }
 
+    /// Whether all lights are in codes for which `f` holds; looks at nothing else of them.
+    pub fn is_all_in(&self, f: impl Fn(Code) -> bool) -> bool {
+        self.records().all(|record| code_of(record).is_some_and(&f))
+    }
+
     fn records(&self) -> impl Iterator<Item = &'a [u8; LIGHT_BYTES]> + use<'a> {
         self.lights.as_chunks::<LIGHT_BYTES>().0.iter()
     }

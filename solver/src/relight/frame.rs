@@ -436,13 +436,13 @@ impl<'a, T: Encode> Finish<'a, T> {
     pub(super) fn by_run(
         &self,
         mut pixels: &mut [T::Pixel],
-        mut f: impl FnMut(&mut [T::Pixel], [u32; 3]),
+        mut f: impl FnMut(&mut [T::Pixel], [u16; 3]),
     ) -> Result<(), RelightError> {
         self.check(pixels.len())?;
         for run in self.runs {
             let own = pixels.split_off_mut(..run.elements as usize);
             let factors = self.factors(run).unwrap_or_default();
-            f(own.unwrap_or_default(), factors.map(u32::from));
+            f(own.unwrap_or_default(), factors);
         }
         Ok(())
     }

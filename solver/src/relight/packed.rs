@@ -12,16 +12,12 @@
 //! `K` is a constant because it halves the instructions. Any mixture of codes, tiles above all, goes through [`full_any`],
 //! which decodes first.
 
+use core::hint::black_box;
+
 use super::frame::{Encode, Finish, FrameMix, Terms, Weight};
 use super::{CodeTable, RelightError, check_elements};
 use crate::atlas::Atlas;
 use crate::code::Code;
-
-/// Elements that are added up before they are shown.
-const CHUNK: usize = 32;
-
-/// Sums that are kept in registers; fewer where there are no atomics, on cores that have eight registers for most of what they do.
-const BLOCK: usize = if cfg!(target_has_atomic = "32") { 8 } else { 4 };
 
 /// Bits of red, green and blue in a packed word, red at the top.
 const PACKED: [u32; 3] = [10, 12, 10];
@@ -35,8 +31,9 @@ pub trait Form {
     type Codes: Copy;
     /// The contribution of a light, or a sum of them.
     type Sum: Copy + Default;
-    /// The contributions of every code.
-    type Table;
+    /// What every code contributes of `L` lights; those of one code stand next to each other, which suits the addressing of
+    /// small cores best where `L` is a power of two.
+    type Table<const L: usize>;
 
     /// Bits of a sum.
     const BITS: [u32; 3];
@@ -44,16 +41,21 @@ pub trait Form {
     /// The codes of all elements, whose lights stand next to each other; `None` for lights in another form.
     fn codes<'a>(atlas: &Atlas<'a>) -> Option<&'a [Self::Codes]>;
 
-    /// Fills a table with the difference of what two weights of a light make of every code.
-    fn fill(table: &mut Self::Table, before: &Terms, after: &Terms);
+    /// Fills one light of a table with the difference of what two weights make of every code.
+    fn fill<const L: usize>(table: &mut Self::Table<L>, light: usize, before: &Terms, after: &Terms);
 
-    /// A sum, and what a table says of some codes.
+    /// A sum, and what a table says of a light's codes.
     #[must_use]
-    fn add(sum: Self::Sum, table: &Self::Table, codes: Self::Codes) -> Self::Sum;
+    fn add<const L: usize>(
+        sum: Self::Sum,
+        table: &Self::Table<L>,
+        light: usize,
+        codes: Self::Codes,
+    ) -> Self::Sum;
 
     /// What is shown of a sum.
     #[must_use]
-    fn steps(sum: Self::Sum, factors: [u32; 3]) -> [u32; 3];
+    fn steps(sum: Self::Sum, factors: [u16; 3]) -> [u32; 3];
 }
 
 /// All lights in [`Code::Lum8`].
@@ -63,32 +65,39 @@ pub struct Lum;
 impl Form for Lum {
     type Codes = u8;
     type Sum = u32;
-    type Table = [u32; 256];
+    type Table<const L: usize> = [[u32; L]; 256];
 
     const BITS: [u32; 3] = PACKED;
 
     fn codes<'a>(atlas: &Atlas<'a>) -> Option<&'a [u8]> {
-        let fits = atlas.lights().all(|light| light.code == Code::Lum8);
+        let fits = atlas.is_all_in(|code| code == Code::Lum8);
         fits.then_some(atlas.codes())
     }
 
-    fn fill(table: &mut [u32; 256], before: &Terms, after: &Terms) {
+    fn fill<const L: usize>(
+        table: &mut [[u32; L]; 256],
+        light: usize,
+        before: &Terms,
+        after: &Terms,
+    ) {
         let pack = |[(r, values), (g, _), (b, _)]: &Terms, code| {
             let value = values.of(code);
             r.of(value) << 22 | g.of(value) << 10 | b.of(value)
         };
-        for (entry, code) in table.iter_mut().zip(0..) {
+        let own = table.iter_mut().filter_map(|lights| lights.get_mut(light));
+        for (entry, code) in own.zip(0..) {
             *entry = pack(after, code).wrapping_sub(pack(before, code));
         }
     }
 
     #[inline(always)]
-    fn add(sum: u32, table: &[u32; 256], code: u8) -> u32 {
-        sum.wrapping_add(entry(table, code))
+    fn add<const L: usize>(sum: u32, table: &[[u32; L]; 256], light: usize, code: u8) -> u32 {
+        sum.wrapping_add(entry(table, light, code))
     }
 
     #[inline(always)]
-    fn steps(sum: u32, [r, g, b]: [u32; 3]) -> [u32; 3] {
+    fn steps(sum: u32, factors: [u16; 3]) -> [u32; 3] {
+        let [r, g, b] = factors.map(u32::from);
         // Products of 10 or 12 bits and 16; steps of 11.
         [
             ((sum >> 22) * r) >> 15,
@@ -105,19 +114,25 @@ pub struct Colour;
 impl Form for Colour {
     type Codes = [u8; 3];
     type Sum = [u16; 3];
-    type Table = [[u16; 256]; 3];
+    type Table<const L: usize> = [[[u16; L]; 256]; 3];
 
     const BITS: [u32; 3] = [SINGLE; 3];
 
     fn codes<'a>(atlas: &Atlas<'a>) -> Option<&'a [[u8; 3]]> {
-        let fits = atlas.lights().all(|light| light.code.bytes() == 3);
+        let fits = atlas.is_all_in(|code| code.bytes() == 3);
         fits.then_some(atlas.codes().as_chunks().0)
     }
 
-    fn fill(tables: &mut [[u16; 256]; 3], before: &Terms, after: &Terms) {
+    fn fill<const L: usize>(
+        tables: &mut [[[u16; L]; 256]; 3],
+        light: usize,
+        before: &Terms,
+        after: &Terms,
+    ) {
         for ((table, before), after) in tables.iter_mut().zip(before).zip(after) {
             let (weight, values) = after;
-            for (entry, code) in table.iter_mut().zip(0..) {
+            let own = table.iter_mut().filter_map(|lights| lights.get_mut(light));
+            for (entry, code) in own.zip(0..) {
                 let value = values.of(code);
                 *entry = weight.of(value).wrapping_sub(before.0.of(value)) as u16;
             }
@@ -125,19 +140,24 @@ impl Form for Colour {
     }
 
     #[inline(always)]
-    fn add(sum: [u16; 3], tables: &[[u16; 256]; 3], codes: [u8; 3]) -> [u16; 3] {
+    fn add<const L: usize>(
+        sum: [u16; 3],
+        tables: &[[[u16; L]; 256]; 3],
+        light: usize,
+        codes: [u8; 3],
+    ) -> [u16; 3] {
         let ([r, g, b], [red, green, blue]) = (sum, tables);
         let [code_r, code_g, code_b] = codes;
         [
-            r.wrapping_add(entry(red, code_r)),
-            g.wrapping_add(entry(green, code_g)),
-            b.wrapping_add(entry(blue, code_b)),
+            r.wrapping_add(entry(red, light, code_r)),
+            g.wrapping_add(entry(green, light, code_g)),
+            b.wrapping_add(entry(blue, light, code_b)),
         ]
     }
 
     #[inline(always)]
-    fn steps(sum: [u16; 3], factors: [u32; 3]) -> [u32; 3] {
-        let ([r, g, b], [factor_r, factor_g, factor_b]) = (sum.map(u32::from), factors);
+    fn steps(sum: [u16; 3], factors: [u16; 3]) -> [u32; 3] {
+        let ([r, g, b], [factor_r, factor_g, factor_b]) = (sum.map(u32::from), factors.map(u32::from));
         [
             (r * factor_r) >> 21,
             (g * factor_g) >> 21,
@@ -147,88 +167,82 @@ impl Form for Colour {
 }
 
 #[inline(always)]
-fn entry<V: Copy>(table: &[V; 256], code: u8) -> V {
+fn entry<V: Copy + Default, const L: usize>(table: &[[V; L]; 256], light: usize, code: u8) -> V {
     // A byte cannot leave a table of 256.
     #[allow(clippy::indexing_slicing)]
-    table[usize::from(code)]
+    let lights = &table[usize::from(code)];
+    lights.get(light).copied().unwrap_or_default()
 }
 
 /// Multiplies out one light of a mix.
 ///
 /// # Errors
 /// [`RelightError::Lights`] without such a light.
-pub fn fill_table<F: Form>(
+pub fn fill_table<F: Form, const L: usize>(
     atlas: &Atlas,
     mix: &FrameMix,
     light: u32,
-    table: &mut F::Table,
+    table: &mut F::Table<L>,
 ) -> Result<(), RelightError> {
     let after = mix.terms(atlas, light, F::BITS)?;
-    F::fill(
-        table,
-        &after.map(|(_, values)| (Weight::ZERO, values)),
-        &after,
-    );
+    let before = after.map(|(_, values)| (Weight::ZERO, values));
+    F::fill(table, light as usize, &before, &after);
     Ok(())
 }
 
-/// The pixels of all elements, from the tables of all `K` lights.
+/// The pixels of all elements, from a table of all `K` lights; `L` is at least `K`.
 ///
 /// # Errors
 /// Slices and runs that do not fit the atlas; [`RelightError::Code`] for another form.
-pub fn full<F: Form, const K: usize, T: Encode>(
+pub fn full<F: Form, const K: usize, const L: usize, T: Encode>(
     atlas: &Atlas,
-    tables: &[F::Table; K],
+    table: &F::Table<L>,
     finish: &Finish<T>,
     pixels: &mut [T::Pixel],
 ) -> Result<(), RelightError> {
     check_elements(atlas, pixels.len())?;
     let mut rows = rows::<F, K>(atlas)?;
+    if L < K {
+        return Err(RelightError::Table { needed: K });
+    }
     finish.by_run(pixels, |pixels, factors| {
         let own = rows.split_off(..pixels.len()).unwrap_or_default();
-        for (rows, pixels) in own.chunks(CHUNK).zip(pixels.chunks_mut(CHUNK)) {
-            let mut sums = [F::Sum::default(); CHUNK];
-            add_up::<F, K>(rows, tables, &mut sums);
-            for (pixel, sum) in pixels.iter_mut().zip(sums) {
-                *pixel = finish.tone.encode(F::steps(sum, factors));
-            }
-        }
+        full_run::<F, K, L, T>(own, table, factors, finish.tone, pixels);
     })
 }
 
-/// Sums of some elements. A function of its own has the registers for it, and loops that are not merged with others.
+/// The pixels of a run. A function of its own has registers for all that it needs.
 #[inline(never)]
-fn add_up<F: Form, const K: usize>(
+fn full_run<F: Form, const K: usize, const L: usize, T: Encode>(
     rows: &[[F::Codes; K]],
-    tables: &[F::Table],
-    sums: &mut [F::Sum; CHUNK],
+    table: &F::Table<L>,
+    factors: [u16; 3],
+    tone: &T,
+    pixels: &mut [T::Pixel],
 ) {
-    let (blocks, rest) = rows.as_chunks::<BLOCK>();
-    let (block_sums, _) = sums.as_chunks_mut::<BLOCK>();
-    for (rows, sums) in blocks.iter().zip(block_sums) {
-        *sums = add_block::<F, K, BLOCK>(rows, tables);
-    }
-    let sums = sums.iter_mut().skip(blocks.len() * BLOCK);
-    for (row, sum) in rest.as_chunks().0.iter().zip(sums) {
-        [*sum] = add_block::<F, K, 1>(row, tables);
+    for (row, pixel) in rows.iter().zip(pixels) {
+        let mut sum = F::Sum::default();
+        for (light, codes) in row.iter().enumerate() {
+            sum = F::add(sum, table, light, *codes);
+        }
+        *pixel = tone.encode(F::steps(sum, factors));
+        as_it_is();
     }
 }
 
-/// Light by light, so that its table is found once for all elements.
-#[inline(always)]
-fn add_block<F: Form, const K: usize, const N: usize>(
-    rows: &[[F::Codes; K]; N],
-    tables: &[F::Table],
-) -> [F::Sum; N] {
-    let mut sums = [F::Sum::default(); N];
-    for (light, table) in (0..K).zip(tables) {
-        for (sum, row) in sums.iter_mut().zip(rows) {
-            if let Some(codes) = row.get(light) {
-                *sum = F::add(*sum, table, *codes);
-            }
-        }
+/// The pixels of some sums.
+#[inline(never)]
+fn show<F: Form, T: Encode>(sums: &[F::Sum], factors: [u16; 3], tone: &T, pixels: &mut [T::Pixel]) {
+    for (pixel, sum) in pixels.iter_mut().zip(sums) {
+        *pixel = tone.encode(F::steps(*sum, factors));
+        as_it_is();
     }
-    sums
+}
+
+/// Keeps the compiler from merging the turns of a loop, which would run out of registers.
+#[inline(always)]
+fn as_it_is() {
+    black_box(());
 }
 
 /// Sums of all elements, kept from frame to frame.
@@ -236,7 +250,7 @@ fn add_block<F: Form, const K: usize, const N: usize>(
 pub struct Sums<'a, F: Form> {
     sums: &'a mut [F::Sum],
     /// Of one light at a time.
-    table: &'a mut F::Table,
+    table: &'a mut F::Table<1>,
 }
 
 impl<'a, F: Form> Sums<'a, F> {
@@ -248,16 +262,18 @@ impl<'a, F: Form> Sums<'a, F> {
         atlas: &Atlas,
         mix: &FrameMix,
         sums: &'a mut [F::Sum],
-        table: &'a mut F::Table,
+        table: &'a mut F::Table<1>,
     ) -> Result<Self, RelightError> {
         check_elements(atlas, sums.len())?;
         let rows = rows::<F, K>(atlas)?;
         sums.fill(F::Sum::default());
         for light in 0..K {
-            fill_table::<F>(atlas, mix, light as u32, table)?;
+            let after = mix.terms(atlas, light as u32, F::BITS)?;
+            let before = after.map(|(_, values)| (Weight::ZERO, values));
+            F::fill(table, 0, &before, &after);
             for (sum, row) in sums.iter_mut().zip(rows) {
                 if let Some(codes) = row.get(light) {
-                    *sum = F::add(*sum, table, *codes);
+                    *sum = F::add(*sum, table, 0, *codes);
                 }
             }
         }
@@ -276,9 +292,7 @@ impl<'a, F: Form> Sums<'a, F> {
         let mut sums = &*self.sums;
         finish.by_run(pixels, |pixels, factors| {
             let own = sums.split_off(..pixels.len()).unwrap_or_default();
-            for (sum, pixel) in own.iter().zip(pixels) {
-                *pixel = finish.tone.encode(F::steps(*sum, factors));
-            }
+            show::<F, T>(own, factors, finish.tone, pixels);
         })
     }
 
@@ -314,7 +328,7 @@ impl<'a, F: Form> Sums<'a, F> {
         let before = mix.terms(atlas, light, F::BITS)?;
         mix.set(light, levels);
         let after = mix.terms(atlas, light, F::BITS)?;
-        F::fill(self.table, &before, &after);
+        F::fill(self.table, 0, &before, &after);
         Ok(())
     }
 
@@ -337,9 +351,10 @@ impl<'a, F: Form> Sums<'a, F> {
             let sums = sums.split_off_mut(..pixels.len()).unwrap_or_default();
             for ((sum, pixel), row) in sums.iter_mut().zip(pixels).zip(own) {
                 if let Some(codes) = row.get(light) {
-                    *sum = F::add(*sum, table, *codes);
+                    *sum = F::add(*sum, table, 0, *codes);
                 }
                 *pixel = finish.tone.encode(F::steps(*sum, factors));
+                as_it_is();
             }
         })
     }

@@ -67,9 +67,9 @@ fn report(per_frame: u32, warm: u32, hash: u32) -> ! {
 }
 
 /// Frames from the tables of all lights.
-pub fn run_full<F: Form, const K: usize>(
+pub fn run_full<F: Form, const K: usize, const L: usize>(
     input: &'static Input<K>,
-    tables: &'static mut [F::Table; K],
+    table: &'static mut F::Table<L>,
     pixels: &'static mut [u16],
 ) -> ! {
     paint_stack();
@@ -78,18 +78,18 @@ pub fn run_full<F: Form, const K: usize>(
     let mut room = [FrameLight::EMPTY; K];
     let mut mix = must(FrameMix::new(&atlas, &input.full, &mut room));
     let finish = must(Finish::new(&atlas, &mix, input.runs, input.exposure, &TONE));
-    let mut frame = |levels: &[[u16; 3]; K], tables: &mut [F::Table; K], pixels: &mut [u16]| {
+    let mut frame = |levels: &[[u16; 3]; K], table: &mut F::Table<L>, pixels: &mut [u16]| {
         set_all(&mut mix, levels);
-        for (light, table) in (0..).zip(tables.iter_mut()) {
-            must(fill_table::<F>(&atlas, &mix, light, table));
+        for light in 0..K as u32 {
+            must(fill_table::<F, L>(&atlas, &mix, light, table));
         }
-        must(full::<F, K, _>(&atlas, black_box(tables), &finish, pixels));
+        must(full::<F, K, L, _>(&atlas, black_box(table), &finish, pixels));
     };
-    frame(&first, tables, pixels);
-    let cold = count(|| frame(&second, tables, pixels));
+    frame(&first, table, pixels);
+    let cold = count(|| frame(&second, table, pixels));
     let cold_hash = hash(pixels);
     pixels.fill(0);
-    let warm = count(|| must(full::<F, K, _>(&atlas, black_box(tables), &finish, pixels)));
+    let warm = count(|| must(full::<F, K, L, _>(&atlas, black_box(table), &finish, pixels)));
     same(cold_hash, hash(pixels));
     report(cold, warm, cold_hash)
 }
@@ -98,7 +98,7 @@ pub fn run_full<F: Form, const K: usize>(
 pub fn run_sums<F: Form, const K: usize>(
     input: &'static Input<K>,
     sums: &'static mut [F::Sum],
-    table: &'static mut F::Table,
+    table: &'static mut F::Table<1>,
     pixels: &'static mut [u16],
 ) -> ! {
     paint_stack();
@@ -119,7 +119,7 @@ pub fn run_sums<F: Form, const K: usize>(
 pub fn run_change<F: Form, const K: usize>(
     input: &'static Input<K>,
     sums: &'static mut [F::Sum],
-    table: &'static mut F::Table,
+    table: &'static mut F::Table<1>,
     pixels: &'static mut [u16],
 ) -> ! {
     paint_stack();

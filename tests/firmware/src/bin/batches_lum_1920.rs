@@ -11,7 +11,7 @@ use relume::relight::Lum;
 include!(concat!(env!("FIRMWARE_DATA"), "/lum_1920x30.rs"));
 
 static SUMS: Lent<[u32; 1920]> = Lent::new([0; 1920]);
-static TABLE: Lent<[u32; 256]> = Lent::new([0; 256]);
+static TABLE: Lent<[[u32; 1]; 256]> = Lent::new([[0; 1]; 256]);
 static PIXELS: Lent<[u16; 1920]> = Lent::new([0; 1920]);
 
 #[entry]

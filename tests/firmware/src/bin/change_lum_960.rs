@@ -11,7 +11,7 @@ use relume::relight::Lum;
 include!(concat!(env!("FIRMWARE_DATA"), "/lum_960x8.rs"));
 
 static SUMS: Lent<[u32; 960]> = Lent::new([0; 960]);
-static TABLE: Lent<[u32; 256]> = Lent::new([0; 256]);
+static TABLE: Lent<[[u32; 1]; 256]> = Lent::new([[0; 1]; 256]);
 static PIXELS: Lent<[u16; 960]> = Lent::new([0; 960]);
 
 #[entry]

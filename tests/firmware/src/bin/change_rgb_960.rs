@@ -11,7 +11,7 @@ use relume::relight::Colour;
 include!(concat!(env!("FIRMWARE_DATA"), "/rgb_960x8.rs"));
 
 static SUMS: Lent<[[u16; 3]; 960]> = Lent::new([[0; 3]; 960]);
-static TABLE: Lent<[[u16; 256]; 3]> = Lent::new([[0; 256]; 3]);
+static TABLE: Lent<[[[u16; 1]; 256]; 3]> = Lent::new([[[0; 1]; 256]; 3]);
 static PIXELS: Lent<[u16; 960]> = Lent::new([0; 960]);
 
 #[entry]

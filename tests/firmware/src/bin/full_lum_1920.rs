@@ -10,11 +10,11 @@ use relume::relight::Lum;
 
 include!(concat!(env!("FIRMWARE_DATA"), "/lum_1920x30.rs"));
 
-static TABLES: Lent<[[u32; 256]; 30]> = Lent::new([[0; 256]; 30]);
+static TABLE: Lent<[[u32; 32]; 256]> = Lent::new([[0; 32]; 256]);
 static PIXELS: Lent<[u16; 1920]> = Lent::new([0; 1920]);
 
 #[entry]
 fn main() -> ! {
     // SAFETY: once.
-    unsafe { run_full::<Lum, 30>(&INPUT, TABLES.lend(), PIXELS.lend()) }
+    unsafe { run_full::<Lum, 30, 32>(&INPUT, TABLE.lend(), PIXELS.lend()) }
 }

@@ -10,11 +10,11 @@ use relume::relight::Lum;
 
 include!(concat!(env!("FIRMWARE_DATA"), "/lum_960x8.rs"));
 
-static TABLES: Lent<[[u32; 256]; 8]> = Lent::new([[0; 256]; 8]);
+static TABLE: Lent<[[u32; 8]; 256]> = Lent::new([[0; 8]; 256]);
 static PIXELS: Lent<[u16; 960]> = Lent::new([0; 960]);
 
 #[entry]
 fn main() -> ! {
     // SAFETY: once.
-    unsafe { run_full::<Lum, 8>(&INPUT, TABLES.lend(), PIXELS.lend()) }
+    unsafe { run_full::<Lum, 8, 8>(&INPUT, TABLE.lend(), PIXELS.lend()) }
 }

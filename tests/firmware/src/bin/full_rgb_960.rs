@@ -10,11 +10,11 @@ use relume::relight::Colour;
 
 include!(concat!(env!("FIRMWARE_DATA"), "/rgb_960x8.rs"));
 
-static TABLES: Lent<[[[u16; 256]; 3]; 8]> = Lent::new([[[0; 256]; 3]; 8]);
+static TABLE: Lent<[[[u16; 8]; 256]; 3]> = Lent::new([[[0; 8]; 256]; 3]);
 static PIXELS: Lent<[u16; 960]> = Lent::new([0; 960]);
 
 #[entry]
 fn main() -> ! {
     // SAFETY: once.
-    unsafe { run_full::<Colour, 8>(&INPUT, TABLES.lend(), PIXELS.lend()) }
+    unsafe { run_full::<Colour, 8, 8>(&INPUT, TABLE.lend(), PIXELS.lend()) }
 }
