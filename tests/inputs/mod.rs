@@ -183,7 +183,9 @@ impl Input {
         match self.name {
             "lum_960x8" => self.table::<Lum, 8, 8>(&mix, [[0; 8]; 256], &finish, &mut pixels),
             "lum_1920x30" => self.table::<Lum, 30, 32>(&mix, [[0; 32]; 256], &finish, &mut pixels),
-            "rgb_960x8" => self.table::<Colour, 8, 8>(&mix, [[[0; 8]; 256]; 3], &finish, &mut pixels),
+            "rgb_960x8" => {
+                self.table::<Colour, 8, 8>(&mix, [[[0; 8]; 256]; 3], &finish, &mut pixels)
+            }
             _ => {
                 let mut values = vec![0; table_length(&atlas)];
                 let table = AnyTable::new(&atlas, &mix, &mut values).expect("it fits");

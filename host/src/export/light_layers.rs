@@ -33,6 +33,7 @@ pub fn layers(
             surfaces: &solution.surfaces,
             irradiance: &solution.relight(&only),
             exitance: &solution.face_exitance(&only),
+            gathered: None,
         };
         Ok((light.name.clone(), render(&relit, camera, brightest)?))
     };

@@ -17,7 +17,7 @@ use crate::atlas::Atlas;
 pub fn add_lights<F: Form>(
     atlas: &Atlas,
     mix: &FrameMix,
-    table: &mut F::Table,
+    table: &mut F::Table<1>,
     sums: &mut [F::Sum],
 ) -> Result<(), RelightError> {
     check_elements(atlas, sums.len())?;
@@ -25,7 +25,7 @@ pub fn add_lights<F: Form>(
     for light in 0..atlas.light_count() {
         let after = mix.terms(atlas, light, F::BITS)?;
         let before = after.map(|(_, values)| (Weight::ZERO, values));
-        F::fill(table, &before, &after);
+        F::fill(table, 0, &before, &after);
         add::<F>(atlas, light, table, sums)?;
     }
     Ok(())
@@ -39,7 +39,7 @@ pub fn change_light<F: Form>(
     atlas: &Atlas,
     mix: &mut FrameMix,
     (light, levels): (u32, [u16; 3]),
-    table: &mut F::Table,
+    table: &mut F::Table<1>,
     sums: &mut [F::Sum],
 ) -> Result<(), RelightError> {
     check_elements(atlas, sums.len())?;
@@ -47,7 +47,7 @@ pub fn change_light<F: Form>(
     let before = mix.terms(atlas, light, F::BITS)?;
     mix.set(light, levels);
     let after = mix.terms(atlas, light, F::BITS)?;
-    F::fill(table, &before, &after);
+    F::fill(table, 0, &before, &after);
     add::<F>(atlas, light, table, sums)
 }
 
@@ -55,7 +55,7 @@ pub fn change_light<F: Form>(
 fn add<F: Form>(
     atlas: &Atlas,
     light: u32,
-    table: &F::Table,
+    table: &F::Table<1>,
     sums: &mut [F::Sum],
 ) -> Result<(), RelightError> {
     let codes = F::codes(atlas).ok_or(RelightError::Code)?;
@@ -64,7 +64,7 @@ fn add<F: Form>(
     let rows = codes.chunks_exact(lights.get());
     for (sum, row) in sums.iter_mut().zip(rows) {
         if let Some(codes) = row.get(light as usize) {
-            *sum = F::add(*sum, table, *codes);
+            *sum = F::add(*sum, table, 0, *codes);
         }
     }
     Ok(())

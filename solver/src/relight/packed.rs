@@ -42,7 +42,12 @@ pub trait Form {
     fn codes<'a>(atlas: &Atlas<'a>) -> Option<&'a [Self::Codes]>;
 
     /// Fills one light of a table with the difference of what two weights make of every code.
-    fn fill<const L: usize>(table: &mut Self::Table<L>, light: usize, before: &Terms, after: &Terms);
+    fn fill<const L: usize>(
+        table: &mut Self::Table<L>,
+        light: usize,
+        before: &Terms,
+        after: &Terms,
+    );
 
     /// A sum, and what a table says of a light's codes.
     #[must_use]
@@ -157,7 +162,8 @@ impl Form for Colour {
 
     #[inline(always)]
     fn steps(sum: [u16; 3], factors: [u16; 3]) -> [u32; 3] {
-        let ([r, g, b], [factor_r, factor_g, factor_b]) = (sum.map(u32::from), factors.map(u32::from));
+        let ([r, g, b], [factor_r, factor_g, factor_b]) =
+            (sum.map(u32::from), factors.map(u32::from));
         [
             (r * factor_r) >> 21,
             (g * factor_g) >> 21,
