@@ -121,7 +121,7 @@ fn other_atlases_are_refused() {
     let bytes = include_bytes!("fuzz/seeds/atlas/lum8.atlas");
     let mut memory = Box::new(Memory::new());
     let atlas = Atlas::parse(bytes).expect("a seed of the fuzzer");
-    assert!(Panel::new(atlas, &mut memory).is_none());
+    assert!(Panel::new(atlas, &mut memory).is_err());
 }
 
 /// FNV-1a, 32 bits.

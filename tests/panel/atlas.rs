@@ -4,15 +4,13 @@ use std::ops::ControlFlow;
 
 use anyhow::Result;
 use relume::atlas::Quantity;
+use relume::code::Code;
 use relume_host::bake::{Settings, bake};
 use relume_host::builtin::{Builtin, flat};
 use relume_host::export::light_layers::{contributions, layers};
-use relume_host::pack::{Aim, Request, choose};
+use relume_host::pack::{Format, pack};
 use relume_host::preview::{Camera, Viewpoint};
-use relume_panel::PICTURE;
-
-/// Display codes that packing may cost: a step of the display is four to eight.
-const MAX_ERROR: f32 = 2.0;
+use relume_panel::{BRIGHTEST, EXPOSURE, PICTURE};
 
 /// Bakes the flat and packs its picture.
 pub fn atlas() -> Result<Vec<u8>> {
@@ -34,12 +32,26 @@ pub fn atlas() -> Result<Vec<u8>> {
         fov: camera.fov,
     };
     let camera = Camera::new(viewpoint, PICTURE.size.width, PICTURE.size.height)?;
-    let (picture, _) = contributions(&layers(&solution, &camera, f32::INFINITY)?);
-    let request = Request {
-        aim: Aim::Error(MAX_ERROR),
-        given: &vec![None; picture.lights.len()],
+    let mut layers = layers(&solution, &camera, f32::INFINITY)?;
+    for (_, layer) in &mut layers {
+        layer
+            .pixels
+            .iter_mut()
+            .for_each(|pixel| limit(pixel, BRIGHTEST / EXPOSURE));
+    }
+    let (picture, _) = contributions(&layers);
+    let format = Format {
+        packing: Code::Display8.into(),
         quantity: Quantity::Radiance,
         mesh: false,
     };
-    Ok(choose(&picture, request)?.bytes)
+    Ok(pack(&picture, format)?)
+}
+
+/// Darkens a pixel that is too bright, and keeps its hue.
+fn limit([r, g, b, _]: &mut [f32; 4], brightest: f32) {
+    let excess = r.max(*g).max(*b) / brightest;
+    if excess > 1.0 {
+        [r, g, b].into_iter().for_each(|value| *value /= excess);
+    }
 }

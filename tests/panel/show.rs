@@ -38,8 +38,7 @@ fn main() -> Result<()> {
     fs::write(folder.join("panel.atlas"), &bytes)?;
 
     let mut memory = Box::new(Memory::new());
-    let panel = Panel::new(Atlas::parse(&bytes)?, &mut memory);
-    let mut panel = panel.context("this atlas is not of the flat")?;
+    let mut panel = Panel::new(Atlas::parse(&bytes)?, &mut memory)?;
     let mut evening = Film::new(SCREEN.size);
     evening.add(shot(&panel), RESTING);
     for touch in EVENING {

@@ -2,7 +2,6 @@
 
 use embedded_graphics::geometry::Point;
 use embedded_graphics::pixelcolor::Rgb565;
-use relume::color::Rgb;
 
 /// Number of lamps.
 pub const LAMPS: usize = 6;
@@ -63,8 +62,6 @@ pub const ROOMS: [Room; 3] = [
 /// The state of a lamp.
 #[derive(Clone, Copy, Debug)]
 pub struct Lamp {
-    /// Weight at full level.
-    pub(crate) nominal: Rgb,
     is_on: bool,
     /// What it is dimmed to, in per cent, also while it is off.
     level: u8,
@@ -77,7 +74,6 @@ const FADE: u8 = 34;
 
 impl Lamp {
     pub(crate) const OFF: Self = Self {
-        nominal: Rgb::BLACK,
         is_on: false,
         level: 100,
         shown: 0,
@@ -114,9 +110,10 @@ impl Lamp {
         self.shown != before
     }
 
-    /// Weight of its light. The eye is closer to a root than to the light itself: half the level is a quarter of it.
-    pub(crate) fn weight(&self) -> Rgb {
-        let share = f32::from(self.shown) / 100.0;
-        self.nominal * (share * share)
+    /// Weight of its light, in 2^-16. The eye is closer to a root than to the light itself: half the level is a
+    /// quarter of it.
+    pub(crate) fn weight(&self) -> u16 {
+        let shown = u32::from(self.shown);
+        (shown * shown * u32::from(u16::MAX) / 10_000) as u16
     }
 }

@@ -1,8 +1,7 @@
 //! A smart-home room panel of 320 x 240 pixels: the rooms as their lamps really light them, and a slider for each lamp.
 //!
-//! What a product does with Relume. The picture of the flat is an atlas of an image: its elements are the pixels, so a
-//! frame is relit tile by tile, toned, and sent to the display; the device has no memory for a picture. A tap on a
-//! lamp, in the picture or on its slider, toggles it; a drag along the slider dims it; [`Panel::tick`] fades.
+//! What a product does with Relume. The picture of the flat is an atlas of an image: its elements are the pixels, and
+//! a frame is relit in integers, straight to RGB565. A tap on a lamp, in the picture or on its slider, toggles it; a drag along the slider dims it; [`Panel::tick`] fades.
 //!
 //! No std, no allocation, no unsafe code, no panic: the host's example and the microcontroller's image run the same
 //! code. The caller lends all memory ([`Memory`]).
@@ -15,8 +14,6 @@
     clippy::expect_used,
     clippy::panic
 )]
-
-mod tone;
 
 mod lamp;
 
@@ -31,39 +28,36 @@ mod evening;
 use embedded_graphics::draw_target::DrawTarget;
 use embedded_graphics::geometry::{Point, Size};
 use embedded_graphics::pixelcolor::Rgb565;
+use embedded_graphics::pixelcolor::raw::RawU16;
 use relume::atlas::Atlas;
-use relume::color::Rgb;
-use relume::relight::{FixedMix, FixedTable, FixedWeight, RelightError, table_length};
+use relume::relight::{FrameLight, RelightError};
 
 pub use evening::EVENING;
 pub use lamp::{LAMPS, Lamp, ROOMS};
 pub use layout::{PICTURE, SCREEN, slider};
-pub use tone::EXPOSURE;
+pub use picture::{BRIGHTEST, EXPOSURE};
 
-use tone::{STEPS, Tone};
+use picture::{PIXELS, Picture, Table};
 
 /// Lights of the atlas: the lamps, and the dusk outside, which nobody can switch.
 pub const LIGHTS: usize = LAMPS + 1;
 
-/// Codes of a light and channel that [`Memory`] has room for.
-pub const LEVELS: usize = 512;
-
-/// What the panel works in; 51 KiB. A `static` of a device, a box of a host.
+/// What the panel works in; 92 KiB of zeros. A `static` of a device, a box of a host.
 #[derive(Debug)]
 pub struct Memory {
-    weights: [FixedWeight; LIGHTS],
-    table: [u32; LIGHTS * 3 * LEVELS],
-    greys: [u16; STEPS],
+    lights: [FrameLight; LIGHTS],
+    table: Table,
+    pixels: [u16; PIXELS],
 }
 
 impl Memory {
-    /// Zeros.
+    /// Memory for one panel.
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            weights: [FixedWeight::EMPTY; LIGHTS],
-            table: [0; LIGHTS * 3 * LEVELS],
-            greys: [0; STEPS],
+            lights: [FrameLight::EMPTY; LIGHTS],
+            table: [[[0; 8]; 256]; 3],
+            pixels: [0; PIXELS],
         }
     }
 }
@@ -86,42 +80,29 @@ pub enum Touch {
 /// The panel: lamps, their state, and the picture of the flat.
 #[derive(Debug)]
 pub struct Panel<'a> {
-    atlas: Atlas<'a>,
     lamps: [Lamp; LAMPS],
-    mix: FixedMix<'a>,
-    table: FixedTable<'a>,
-    tone: Tone<'a>,
+    picture: Picture<'a>,
 }
 
 impl<'a> Panel<'a> {
-    /// All lamps off; `None` for an atlas that is not a picture of the flat.
-    #[must_use]
-    pub fn new(atlas: Atlas<'a>, memory: &'a mut Memory) -> Option<Self> {
-        let is_picture = atlas.image_size() == Some([PICTURE.size.width, PICTURE.size.height]);
-        if !is_picture || table_length(&atlas) > memory.table.len() {
-            return None;
-        }
-        let mut nominal = [Rgb::BLACK; LIGHTS];
-        for (nominal, light) in nominal.iter_mut().zip(atlas.lights()) {
-            *nominal = light.emission;
-        }
-        let mut dark = [Rgb::BLACK; LIGHTS];
-        if let (Some(dark), Some(nominal)) = (dark.last_mut(), nominal.last()) {
-            *dark = *nominal;
-        }
-        let mix = FixedMix::new(&atlas, &nominal, &dark, &mut memory.weights).ok()?;
-        let table = FixedTable::new(&atlas, &mix, &mut memory.table).ok()?;
-        let mut lamps = [Lamp::OFF; LAMPS];
-        for (lamp, nominal) in lamps.iter_mut().zip(nominal) {
-            lamp.nominal = nominal;
-        }
-        Some(Self {
-            atlas,
-            lamps,
-            tone: Tone::new(mix.unit(), &mut memory.greys),
-            mix,
+    /// All lamps off.
+    ///
+    /// # Errors
+    /// An atlas that is not a picture of the flat.
+    pub fn new(atlas: Atlas<'a>, memory: &'a mut Memory) -> Result<Self, RelightError> {
+        let Memory {
+            lights,
             table,
-        })
+            pixels,
+        } = memory;
+        let mut picture = Picture::new(atlas, lights, table, pixels)?;
+        for lamp in 0..LAMPS {
+            picture.set(lamp as u32, 0)?;
+        }
+        picture.set(LAMPS as u32, u16::MAX)?;
+        picture.relight()?;
+        let lamps = [Lamp::OFF; LAMPS];
+        Ok(Self { lamps, picture })
     }
 
     /// The lamps, room by room.
@@ -151,15 +132,17 @@ impl<'a> Panel<'a> {
     /// One step of every fade; true when the picture has changed.
     ///
     /// # Errors
-    /// None in fact: no lamp exceeds its nominal emission.
+    /// None in fact: the atlas was fit when the panel was made.
     pub fn tick(&mut self) -> Result<bool, RelightError> {
         let mut has_changed = false;
         for (lamp, light) in self.lamps.iter_mut().zip(0..) {
             if lamp.fade() {
-                self.mix.set(light, lamp.weight())?;
-                self.table.update(&self.mix, light);
+                self.picture.set(light, lamp.weight())?;
                 has_changed = true;
             }
+        }
+        if has_changed {
+            self.picture.relight()?;
         }
         Ok(has_changed)
     }
@@ -170,7 +153,9 @@ impl<'a> Panel<'a> {
     /// Those of the display.
     pub fn draw<D: DrawTarget<Color = Rgb565>>(&self, display: &mut D) -> Result<(), D::Error> {
         controls::draw(display, &self.lamps)?;
-        picture::draw(display, &self.atlas, &self.table, &self.tone)
+        let pixels = self.picture.pixels().iter();
+        let colors = pixels.map(|pixel| RawU16::new(*pixel).into());
+        display.fill_contiguous(&PICTURE, colors)
     }
 }
 

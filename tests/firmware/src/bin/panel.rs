@@ -30,7 +30,7 @@ fn main() -> ! {
     let (memory, screen) = unsafe { (MEMORY.lend(), SCREEN.lend()) };
     paint_stack();
     let atlas = Atlas::parse(ATLAS).ok();
-    let Some(mut panel) = atlas.and_then(|atlas| Panel::new(atlas, memory)) else {
+    let Some(Ok(mut panel)) = atlas.map(|atlas| Panel::new(atlas, memory)) else {
         exit(1)
     };
     let Ok(()) = panel.draw(screen);
@@ -41,10 +41,18 @@ fn main() -> ! {
         let Ok(()) = panel.draw(screen);
         say(c"hash", hash(screen.data()));
     }
-    let frame = count(|| {
+    let [first, ..] = EVENING;
+    panel.touch(first);
+    let relit = count(|| {
+        if panel.tick() != Ok(true) {
+            exit(1);
+        }
+    });
+    let drawn = count(|| {
         let Ok(()) = panel.draw(screen);
     });
-    say(c"frame", frame);
+    say(c"relit", relit);
+    say(c"drawn", drawn);
     say(c"stack", largest_stack());
     exit(0)
 }
