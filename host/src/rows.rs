@@ -335,6 +335,7 @@ fn largest_coordinate(polygons: &[Polygon]) -> f32 {
 mod tests {
     use super::*;
     use crate::bake::Meshed;
+    use crate::builtin::{PaperLamps, paper_room};
     use crate::reference::path_trace::PathTracer;
     use crate::scene::{Light, OwnedScene};
     use crate::study::truth::element_receivers;
@@ -373,6 +374,45 @@ mod tests {
                 emission: Rgb::WHITE,
                 importance: 1.0,
             }],
+        }
+    }
+
+    #[test]
+    fn exact_rows_do_not_depend_on_the_scale() {
+        let rows = |scale: f32| -> Vec<f32> {
+            let mut scene = paper_room(PaperLamps::Eight).unwrap().scene;
+            for surface in &mut scene.surfaces {
+                let vertices = surface.polygon().vertices().iter();
+                let vertices: Vec<Vec3> = vertices.map(|v| *v * scale).collect();
+                let of = |reflectance| Surface::new(0, &vertices, reflectance).unwrap();
+                *surface = match surface.emission() {
+                    Some(emission) => of(Rgb::BLACK).emitting(0, emission).unwrap(),
+                    None => of(Rgb::splat(0.5)).two_sided(),
+                };
+            }
+            let mut go_on = |_| ControlFlow::Continue(());
+            let meshed = Meshed::new(&scene, Some(scale), Some(scale / 4.0), &mut go_on).unwrap();
+            let mesh = meshed.mesh().view();
+            let filler = Parallel::new(&mesh, meshed.bvh());
+            let mut row = vec![0.0; mesh.elements.len()];
+            let patches = 0..mesh.patches.len() as u32;
+            patches
+                .flat_map(|patch| {
+                    filler.patch(&mesh, patch, &mut row);
+                    row.clone()
+                })
+                .collect()
+        };
+        let metres = rows(1.0);
+        for scale in [1e-3, 1e3] {
+            let scaled = rows(scale);
+            assert_eq!(scaled.len(), metres.len());
+            for (scaled, factor) in scaled.iter().zip(&metres) {
+                assert!(
+                    (scaled - factor).abs() <= 1e-5,
+                    "{scale}: {scaled} {factor}"
+                );
+            }
         }
     }
 
