@@ -13,9 +13,8 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput};
 use glam::{DVec3, Vec3};
 use relume::form_factor::{self, point_to_polygon};
-use relume::geometry::Polygon;
 use relume::mesh::Mesh;
-use relume::visibility::{Occluders, Shaft, Visibility};
+use relume::visibility::{Obstacle, Occluders, Shaft, Visibility};
 use relume_host::builtin::PaperLamps;
 use relume_host::bvh::Bvh;
 use relume_host::polygon_pair::{self, ConvexPolygon};
@@ -28,7 +27,7 @@ impl Visibility for Open {
         true
     }
 
-    fn between<'v>(&'v self, _: &Shaft, _: &mut impl FnMut(&'v Polygon)) {}
+    fn between<'v>(&'v self, _: &Shaft, _: &mut impl FnMut(Obstacle<'v>)) {}
 }
 
 fn main() {

@@ -3,6 +3,7 @@
 
 mod bake;
 
+use std::array;
 use std::sync::Mutex;
 
 use bake::{baked, exact, room};
@@ -21,7 +22,7 @@ use relume::refine::{Choice, FixedStorage, Refinement};
 use relume::relight::{FixedMix, FixedWeight, change_fixed, relight_fixed};
 use relume::scene::Scene;
 use relume::tone::{Exposure, radiance};
-use relume::visibility::Occluders;
+use relume::visibility::{Body, OccludersAndBodies, bodies};
 use relume_host::bake::Settings;
 
 const ELEMENTS: usize = 960;
@@ -49,8 +50,15 @@ fn bake_and_pack(flash: &mut [u8]) -> usize {
         Refinement::new(mesh, scene.lights(), 1e-2, memory.storage()).expect("it fits");
     refinement.set_choice(Choice::Power);
     let mut row = [0.0; ELEMENTS];
+    let mut found = bodies(surfaces);
+    // The room and the block in it.
+    let bodies: [Body; 2] = array::from_fn(|_| found.next().expect("two bodies"));
+    let occluders = OccludersAndBodies {
+        surfaces,
+        bodies: &bodies,
+    };
     while let Some(patch) = refinement.next_shooter() {
-        form_factor::row(&mesh, patch, &Occluders(surfaces), &mut row);
+        form_factor::row(&mesh, patch, &occluders, &mut row);
         refinement.shoot(patch, &row).expect("a legal row");
     }
 

@@ -256,7 +256,7 @@ fn a_fin_between_plates_leaves_the_two_chambers() {
             form_factor(&floor, &lid, &[fin]),
             truth,
             1e-9,
-            2e-5,
+            1e-4,
         );
     }
 }

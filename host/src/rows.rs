@@ -8,13 +8,13 @@ use std::ops::Range;
 
 use glam::Vec2;
 use rayon::prelude::*;
-use relume::form_factor::{self, Shooter};
+use relume::form_factor::{self, Receiver, Shooter, View};
 use relume::geometry::{Polygon, from_unit_square};
 use relume::luminaire;
 use relume::mesh::Mesh;
 use relume::refine::Refinement;
 use relume::scene::{Luminaire, Scene};
-use relume::visibility::{Occluders, Shaft, Visibility};
+use relume::visibility::{OccludersAndBodies, Shaft, Visibility};
 
 use crate::bvh::{Bvh, Narrowed, lifted};
 use crate::noise;
@@ -103,7 +103,7 @@ fn dark_shares(mesh: &Mesh, scene: &Scene, filler: &impl RowFiller) -> Vec<f32> 
 #[derive(Clone, Copy, Debug)]
 pub struct Serial<'a>(
     /// The surfaces that block.
-    pub Occluders<'a>,
+    pub OccludersAndBodies<'a>,
 );
 
 impl RowFiller for Serial<'_> {
@@ -126,7 +126,9 @@ pub struct Parallel<'a> {
     bvh: &'a Bvh,
     /// Element numbers, patch by patch.
     elements: Vec<u32>,
-    /// Patches that have elements, with their ranges of the list above.
+    /// The same elements.
+    receivers: Vec<Receiver>,
+    /// Patches that have elements, with their ranges of the lists above.
     patches: Vec<(Polygon, Range<usize>)>,
 }
 
@@ -135,8 +137,12 @@ impl<'a> Parallel<'a> {
     #[must_use]
     pub fn new(mesh: &Mesh, bvh: &'a Bvh) -> Self {
         let patch_of = |element: &u32| mesh.elements[*element as usize].patch;
+        let outline = |element: &u32| mesh.element_polygon(&mesh.elements[*element as usize]);
         let mut elements: Vec<u32> = (0..mesh.elements.len() as u32).collect();
+        elements.retain(|element| outline(element).is_some());
         elements.sort_by_key(patch_of);
+        let receivers = elements.iter().filter_map(outline);
+        let receivers = receivers.map(Receiver::new).collect();
         let mut start = 0;
         let patches = elements
             .chunk_by(|a, b| patch_of(a) == patch_of(b))
@@ -149,6 +155,7 @@ impl<'a> Parallel<'a> {
         Self {
             bvh,
             elements,
+            receivers,
             patches,
         }
     }
@@ -168,27 +175,35 @@ impl RowFiller for Parallel<'_> {
             });
     }
 
-    fn shooter(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
+    fn shooter(&self, _: &Mesh, polygon: &Polygon, row: &mut [f32]) {
         let shooter = Shooter::new(*polygon);
         self.fill(row, |receiver, range| {
-            self.factors(mesh, &shooter, receiver, range, |element, seen| {
-                shooter.form_factor(element, seen)
-            })
+            let view = shooter.seen_by(receiver, self.bvh);
+            if view.is_exact() {
+                return self.seen(&view, range, self.bvh);
+            }
+            let narrowed = self.bvh.narrowed(&shaft(polygon, receiver));
+            self.seen(&view, range, &narrowed)
         });
     }
 
-    fn estimate(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
+    fn estimate(&self, _: &Mesh, polygon: &Polygon, row: &mut [f32]) {
         let shooter = Shooter::new(*polygon);
         self.fill(row, |receiver, range| {
-            self.factors(mesh, &shooter, receiver, range, |element, seen| {
-                shooter.estimate(element, seen)
-            })
+            if shooter.is_out_of_sight(receiver) {
+                return Vec::new();
+            }
+            let narrowed = self.bvh.narrowed(&shaft(polygon, receiver));
+            let receivers = self.receivers[range.clone()].iter();
+            receivers
+                .map(|receiver| shooter.estimate(receiver.polygon(), &narrowed))
+                .collect()
         });
     }
 
-    fn lamp(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
+    fn lamp(&self, _: &Mesh, polygon: &Polygon, row: &mut [f32]) {
         self.fill(row, |receiver, range| {
-            self.lamp_factors(mesh, polygon, receiver, range, None)
+            self.lamp_factors(polygon, receiver, range, None)
         });
     }
 }
@@ -208,22 +223,14 @@ impl Parallel<'_> {
         }
     }
 
-    /// Form factors of the elements of one patch; none where the shooter is out of sight.
-    fn factors(
-        &self,
-        mesh: &Mesh,
-        shooter: &Shooter,
-        receiver: &Polygon,
-        range: &Range<usize>,
-        factor: impl Fn(&Polygon, &Narrowed) -> f32,
-    ) -> Vec<f32> {
-        if shooter.is_out_of_sight(receiver) {
+    /// Form factors of the elements of one patch; none where the shooter is hidden from all of it.
+    fn seen(&self, view: &View, range: &Range<usize>, visibility: &impl Visibility) -> Vec<f32> {
+        if view.is_hidden() {
             return Vec::new();
         }
-        let narrowed = self.bvh.narrowed(&shaft(shooter.polygon(), receiver));
-        let receivers = self.receivers(mesh, range);
+        let receivers = self.receivers[range.clone()].iter();
         receivers
-            .map(|receiver| factor(&receiver, &narrowed))
+            .map(|receiver| view.form_factor(receiver, visibility))
             .collect()
     }
 
@@ -232,7 +239,6 @@ impl Parallel<'_> {
     /// one is a quarter of, and how often that has been quartered.
     fn lamp_factors(
         &self,
-        mesh: &Mesh,
         lamp: &Polygon,
         receiver: &Polygon,
         range: &Range<usize>,
@@ -252,15 +258,13 @@ impl Parallel<'_> {
             return Vec::new();
         }
         if !is_many || depth == MOST_QUARTERINGS {
-            let receivers = self.receivers(mesh, range);
-            return receivers
-                .map(|receiver| shooter.form_factor(&receiver, &narrowed))
-                .collect();
+            let view = shooter.seen_by(receiver, &narrowed);
+            return self.seen(&view, range, &narrowed);
         }
         let mut sum = vec![0.0; range.len()];
         for quarter in quarters(lamp) {
             let whole = Some((&narrowed, depth));
-            let factors = self.lamp_factors(mesh, &quarter, receiver, range, whole);
+            let factors = self.lamp_factors(&quarter, receiver, range, whole);
             for (sum, factor) in sum.iter_mut().zip(factors) {
                 *sum += factor;
             }
@@ -291,14 +295,6 @@ impl Parallel<'_> {
                 && is_in_front(lamp, from)
                 && caster.sees(lifted(receiver, from), lifted(lamp, to))
         })
-    }
-
-    /// Outlines of the elements of one patch.
-    fn receivers(&self, mesh: &Mesh, range: &Range<usize>) -> impl Iterator<Item = Polygon> {
-        let elements = self.elements[range.clone()].iter();
-        elements
-            .filter_map(|element| mesh.elements.get(*element as usize))
-            .filter_map(|element| mesh.element_polygon(element))
     }
 }
 
@@ -339,6 +335,7 @@ fn largest_coordinate(polygons: &[Polygon]) -> f32 {
 mod tests {
     use super::*;
     use crate::bake::Meshed;
+    use crate::builtin::{PaperLamps, paper_room};
     use crate::reference::path_trace::PathTracer;
     use crate::scene::{Light, OwnedScene};
     use crate::study::truth::element_receivers;
@@ -377,6 +374,45 @@ mod tests {
                 emission: Rgb::WHITE,
                 importance: 1.0,
             }],
+        }
+    }
+
+    #[test]
+    fn exact_rows_do_not_depend_on_the_scale() {
+        let rows = |scale: f32| -> Vec<f32> {
+            let mut scene = paper_room(PaperLamps::Eight).unwrap().scene;
+            for surface in &mut scene.surfaces {
+                let vertices = surface.polygon().vertices().iter();
+                let vertices: Vec<Vec3> = vertices.map(|v| *v * scale).collect();
+                let of = |reflectance| Surface::new(0, &vertices, reflectance).unwrap();
+                *surface = match surface.emission() {
+                    Some(emission) => of(Rgb::BLACK).emitting(0, emission).unwrap(),
+                    None => of(Rgb::splat(0.5)).two_sided(),
+                };
+            }
+            let mut go_on = |_| ControlFlow::Continue(());
+            let meshed = Meshed::new(&scene, Some(scale), Some(scale / 4.0), &mut go_on).unwrap();
+            let mesh = meshed.mesh().view();
+            let filler = Parallel::new(&mesh, meshed.bvh());
+            let mut row = vec![0.0; mesh.elements.len()];
+            let patches = 0..mesh.patches.len() as u32;
+            patches
+                .flat_map(|patch| {
+                    filler.patch(&mesh, patch, &mut row);
+                    row.clone()
+                })
+                .collect()
+        };
+        let metres = rows(1.0);
+        for scale in [1e-3, 1e3] {
+            let scaled = rows(scale);
+            assert_eq!(scaled.len(), metres.len());
+            for (scaled, factor) in scaled.iter().zip(&metres) {
+                assert!(
+                    (scaled - factor).abs() <= 1e-5,
+                    "{scale}: {scaled} {factor}"
+                );
+            }
         }
     }
 

@@ -21,7 +21,13 @@ fn main() {
     if is_small {
         println!("cargo:rustc-cfg=small");
     }
-    let (flash, ram) = if is_small { ("256K", "16K") } else { ("4M", "192K") };
+    // The screen of the panel, which real boards keep in memory of its own, takes 150 KB.
+    let has_screen = env::var_os("CARGO_FEATURE_PANEL").is_some();
+    let (flash, ram) = match (is_small, has_screen) {
+        (true, _) => ("256K", "16K"),
+        (false, false) => ("4M", "192K"),
+        (false, true) => ("4M", "4M"),
+    };
     let memory = format!(
         "MEMORY {{\n  FLASH : ORIGIN = 0x00000000, LENGTH = {flash}\n  RAM : ORIGIN = 0x20000000, LENGTH = {ram}\n}}\n"
     );

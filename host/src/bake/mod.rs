@@ -18,7 +18,7 @@ use relume::color::Rgb;
 use relume::mesh::{Mesh, MeshError, Spacing};
 use relume::refine::RefineError;
 use relume::scene::{Scene, SceneError};
-use relume::visibility::Occluders;
+use relume::visibility::OccludersAndBodies;
 use thiserror::Error;
 
 use crate::bvh::Bvh;
@@ -282,7 +282,9 @@ impl<'a> Meshed<'a> {
     ) -> Result<(Solution, Hits), BakeError> {
         let view = self.view()?;
         let parallel = |mesh: &Mesh| Parallel::new(mesh, &self.bvh);
-        let serial = |_: &Mesh| Serial(Occluders(view.surfaces()));
+        let (surfaces, bodies) = (view.surfaces(), self.bvh.bodies());
+        let occluders = OccludersAndBodies { surfaces, bodies };
+        let serial = |_: &Mesh| Serial(occluders);
         self.run(settings, watch, |job, mesh| match settings.method {
             Method::Gather if !settings.plain => bounce::gather(job, mesh, &self.bvh),
             Method::Gather | Method::Rows => without_hits(shoot::refine(job, mesh, parallel)),

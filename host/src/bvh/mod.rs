@@ -22,7 +22,7 @@ use relume::geometry::Polygon;
 use relume::luminaire;
 use relume::mesh::Side;
 use relume::scene::{Scene, Source, Surface};
-use relume::visibility::{Bounds, Shaft, Visibility};
+use relume::visibility::{Body, Bounds, Obstacle, Shaft, Visibility, bodies};
 
 use nearest::Facets;
 pub use nearest::{Caster, PointCaster};
@@ -34,6 +34,9 @@ pub struct Bvh {
     polygons: Vec<Polygon>,
     /// Number of the surface of each outline.
     surfaces: Vec<u32>,
+    bodies: Vec<Body>,
+    /// Number of the body of each outline.
+    body_of: Vec<Option<usize>>,
     /// The same surfaces as rays meet them that look for the nearest.
     facets: Facets,
 }
@@ -116,13 +119,21 @@ impl Bvh {
         let mut build_time = Duration::ZERO;
         let tree = build_bvh2(&boxes, BvhBuildParams::very_slow_build(), &mut build_time);
         let order = tree.primitive_indices.clone();
+        let bodies: Vec<Body> = bodies(surfaces).collect();
+        let body_of = |surface: &u32| {
+            let after = bodies.partition_point(|body| body.surfaces().end <= *surface);
+            let body = bodies.get(after)?;
+            body.surfaces().contains(surface).then_some(after)
+        };
         Self {
+            body_of: order.iter().map(body_of).collect(),
             polygons: order
                 .iter()
                 .filter_map(|index| surfaces.get(*index as usize))
                 .map(|surface| *surface.polygon())
                 .collect(),
             surfaces: order,
+            bodies,
             tree,
             facets: Facets::new(surfaces, farthest),
         }
@@ -155,8 +166,14 @@ pub fn lifted(polygon: &Polygon, point: Vec3) -> Vec3 {
 }
 
 impl Bvh {
-    /// The surfaces that a shaft admits, as `(number, outline)` in the order of their numbers.
-    fn admitted(&self, shaft: &Shaft) -> Vec<(u32, &Polygon)> {
+    /// The closed convex bodies among the surfaces.
+    #[must_use]
+    pub fn bodies(&self) -> &[Body] {
+        &self.bodies
+    }
+
+    /// The surfaces that a shaft admits, with their numbers and in the order of these.
+    fn admitted(&self, shaft: &Shaft) -> Vec<(u32, Obstacle<'_>)> {
         let mut found = Vec::new();
         let mut waiting: Vec<usize> = Vec::with_capacity(64);
         waiting.extend((!self.tree.nodes.is_empty()).then_some(0));
@@ -172,11 +189,12 @@ impl Bvh {
             let first = node.first_index as usize;
             if node.is_leaf() {
                 let leaf = first..first + node.prim_count as usize;
-                let leaf = self.surfaces[leaf.clone()].iter().zip(&self.polygons[leaf]);
-                found.extend(
-                    leaf.filter(|(_, polygon)| shaft.admits(polygon))
-                        .map(|(surface, polygon)| (*surface, polygon)),
-                );
+                let admitted = leaf.filter(|index| shaft.admits(&self.polygons[*index]));
+                found.extend(admitted.map(|index| {
+                    let body = self.body_of[index].map(|body| &self.bodies[body]);
+                    let polygon = &self.polygons[index];
+                    (self.surfaces[index], Obstacle { polygon, body })
+                }));
             } else {
                 waiting.extend([first, first + 1]);
             }
@@ -191,7 +209,7 @@ impl Bvh {
         let found = self.admitted(shaft);
         Narrowed {
             bvh: self,
-            blockers: found.into_iter().map(|(_, polygon)| polygon).collect(),
+            blockers: found.into_iter().map(|(_, obstacle)| obstacle).collect(),
         }
     }
 }
@@ -200,7 +218,7 @@ impl Bvh {
 #[derive(Debug)]
 pub struct Narrowed<'a> {
     bvh: &'a Bvh,
-    blockers: Vec<&'a Polygon>,
+    blockers: Vec<Obstacle<'a>>,
 }
 
 impl<'a> Narrowed<'a> {
@@ -216,7 +234,9 @@ impl<'a> Narrowed<'a> {
         let blockers = self.blockers.iter().copied();
         Self {
             bvh: self.bvh,
-            blockers: blockers.filter(|polygon| shaft.admits(polygon)).collect(),
+            blockers: blockers
+                .filter(|obstacle| shaft.admits(obstacle.polygon))
+                .collect(),
         }
     }
 }
@@ -230,10 +250,10 @@ impl Visibility for Narrowed<'_> {
         !self.blockers.is_empty()
     }
 
-    fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(&'v Polygon)) {
+    fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(Obstacle<'v>)) {
         let blockers = self.blockers.iter().copied();
         blockers
-            .filter(|polygon| shaft.admits(polygon))
+            .filter(|obstacle| shaft.admits(obstacle.polygon))
             .for_each(visit);
     }
 }
@@ -248,9 +268,9 @@ impl Visibility for Bvh {
         })
     }
 
-    fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(&'v Polygon)) {
-        for (_, polygon) in self.admitted(shaft) {
-            visit(polygon);
+    fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(Obstacle<'v>)) {
+        for (_, obstacle) in self.admitted(shaft) {
+            visit(obstacle);
         }
     }
 }

@@ -19,8 +19,7 @@
 //!
 //! The error is the difference of two rules, summed over all parts without regard to signs, a doubt where
 //! rules may agree by chance, and a rounding term; the better of the two rules is returned, so it usually errs a
-//! hundred times less. It is an estimate, no proof: slanted blockers through the common edge of a slender wedge
-//! have been seen to err by several times that much.
+//! hundred times less. It is an estimate, no proof: behind blockers three times as much is stated.
 
 mod polygon;
 
@@ -47,8 +46,12 @@ use shadow::Blocker;
 /// Relative error that is aimed at without blockers.
 const OPEN_TOLERANCE: f64 = 1e-6;
 
-/// Relative error that is aimed at behind blockers.
-const OCCLUDED_TOLERANCE: f64 = 1e-5;
+/// Relative error that is stated behind blockers, at most.
+const OCCLUDED_TOLERANCE: f64 = 9e-5;
+
+/// Times by which two rules that differ may both be off behind blockers: among a thousand hostile cases (slivers, wedges,
+/// blockers that pierce or touch) beside evaluations a hundred times finer the worst was 2.3 times the difference.
+const SAFETY: f64 = 3.0;
 
 /// A number that is known within a bound.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -61,7 +64,7 @@ pub struct Estimate {
 
 /// The form factor from the front of `from` to the front of `to`, in [0, 1].
 ///
-/// Relative errors are about 1e-6 or less without blockers and 1e-5 or less behind them; where the bound on the work
+/// Relative errors are about 1e-6 or less without blockers and 1e-4 or less behind them; where the bound on the work
 /// ends a search before that, the error says so. Exactly 0 where the two face away from each other.
 #[must_use]
 pub fn form_factor(
@@ -138,7 +141,12 @@ fn behind(
     if blockers.is_empty() {
         return open;
     }
-    occluded::integrate(domain, target, &blockers, open, OCCLUDED_TOLERANCE)
+    let tolerance = OCCLUDED_TOLERANCE / SAFETY;
+    let found = occluded::integrate(domain, target, &blockers, open, tolerance);
+    Estimate {
+        value: found.value,
+        error: SAFETY * found.error,
+    }
 }
 
 /// A convex outline in the local frame.

@@ -139,7 +139,13 @@ impl<'a> View<'a> {
         if !cast(x, blocker, &mut self.half_spaces) {
             return 0.0;
         }
-        self.part.clone_from(&self.seen);
+        let seen = &self.seen;
+        let misses = |(n, offset): &HalfSpace| seen.iter().all(|v| n.dot(*v) <= *offset);
+        if self.half_spaces[start..].iter().any(misses) {
+            self.half_spaces.truncate(start);
+            return 0.0;
+        }
+        self.part.clone_from(seen);
         for (n, offset) in &self.half_spaces[start..] {
             clip_into(&self.part, &mut self.spare, 0.0, |v| n.dot(v) - offset);
             std::mem::swap(&mut self.part, &mut self.spare);

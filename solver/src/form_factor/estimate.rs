@@ -77,7 +77,7 @@ pub fn estimate(
     visibility: &impl Visibility,
     row: &mut [f32],
 ) {
-    fill_with(mesh, first, row, |receiver| {
-        shooter.estimate(receiver, visibility)
+    fill_with(mesh, first, row, |_, receiver| {
+        shooter.estimate(&receiver, visibility)
     });
 }

@@ -15,23 +15,23 @@
 
 mod estimate;
 mod lambert;
+mod lanes;
+mod view;
 mod visible;
 
 use glam::{Vec2, Vec3};
 use heapless::Vec;
 
-use crate::geometry::{Clipped, Polygon, SamplePoint, from_unit_square, gauss_points};
-use crate::mesh::Mesh;
+use crate::geometry::{Polygon, SamplePoint, from_unit_square};
+use crate::mesh::{Element, Mesh};
 use crate::visibility::{Shaft, Visibility};
 
 pub use estimate::estimate;
 pub use lambert::point_to_polygon;
+pub use view::{Receiver, View};
 
-use lambert::{above_horizon, lambert, open_factor};
-use visible::visible_factor;
-
-/// Most surfaces that may stand between one receiver and one shooter to be cut out exactly.
-const BLOCKERS: usize = 32;
+/// Most surfaces that may stand between one receiver and one shooter to be met one by one.
+const BLOCKERS: usize = 48;
 
 /// A patch that shoots, with the points at which its visibility is sampled.
 #[derive(Clone, Debug)]
@@ -76,38 +76,23 @@ impl Shooter {
         faces_away(&self.polygon, receiver) || faces_away(receiver, &self.polygon)
     }
 
+    /// What stands between the shooter and a receiver, once for all parts of the receiver.
+    #[must_use]
+    pub fn seen_by<'s>(&'s self, receiver: &Polygon, visibility: &'s impl Visibility) -> View<'s> {
+        View::new(self, receiver, visibility)
+    }
+
     /// `F_ji` of one receiver: what its points see of the patch, averaged over its area.
     #[must_use]
     pub fn form_factor(&self, receiver: &Polygon, visibility: &impl Visibility) -> f32 {
-        if self.is_out_of_sight(receiver) {
-            return 0.0;
-        }
-        let blockers = blockers(|| Shaft::new(receiver, &self.polygon), visibility);
-        let blockers = blockers.as_deref();
-        let points = gauss_points(receiver);
-        let factors = points.iter().zip(&self.samples).map(|(point, samples)| {
-            point.weight
-                * self.seen_from(
-                    point.position,
-                    receiver.normal(),
-                    samples,
-                    blockers,
-                    visibility,
-                )
-        });
-        factors.sum::<f32>().min(1.0)
+        let view = self.seen_by(receiver, visibility);
+        view.form_factor(&Receiver::new(*receiver), visibility)
     }
 
     /// The form factor from a point with a unit normal to what it sees of the patch, in [0, 1].
     #[must_use]
     pub fn at_point(&self, point: Vec3, normal: Vec3, visibility: &impl Visibility) -> f32 {
-        self.exact_at_point(point, normal, visibility)
-            .unwrap_or_else(|| {
-                let samples = self.samples.iter().flatten().copied();
-                let samples: Vec<SamplePoint, 16> = samples.collect();
-                let factor = self.seen_from(point, normal, &samples, None, visibility);
-                factor.min(1.0)
-            })
+        View::of_point(self, point, normal, visibility).at_point(point, visibility)
     }
 
     /// The same; `None` where blockers are too many to be cut out.
@@ -118,14 +103,7 @@ impl Shooter {
         normal: Vec3,
         visibility: &impl Visibility,
     ) -> Option<f32> {
-        let (height, tolerance) = self.polygon.height(point);
-        if height <= tolerance {
-            return Some(0.0);
-        }
-        let shaft = || Shaft::from_point(point, normal, &self.polygon);
-        let blockers = blockers(shaft, visibility)?;
-        let factor = self.exact(point, normal, &blockers)?;
-        Some(factor.clamp(0.0, 1.0))
+        View::of_point(self, point, normal, visibility).exact_at_point(point)
     }
 
     /// The form factor from a point with a unit normal to the patch, unoccluded, in [0, 1].
@@ -137,87 +115,9 @@ impl Shooter {
         }
         point_to_polygon(point, normal, self.polygon.vertices())
     }
-
-    /// What a point with a unit normal sees of the patch, not below zero.
-    ///
-    /// `blockers` are all that can stand between, or `None` for too many to cut out.
-    fn seen_from(
-        &self,
-        point: Vec3,
-        normal: Vec3,
-        samples: &[SamplePoint],
-        blockers: Option<&[&Polygon]>,
-        visibility: &impl Visibility,
-    ) -> f32 {
-        let (height, tolerance) = self.polygon.height(point);
-        if height <= tolerance {
-            return 0.0;
-        }
-        let exact = blockers.and_then(|blockers| self.exact(point, normal, blockers));
-        exact
-            .unwrap_or_else(|| self.sampled(point, normal, samples, visibility))
-            .max(0.0)
-    }
-
-    /// The factor of what is visible; `None` when the blockers are too many to be cut out.
-    fn exact(&self, point: Vec3, normal: Vec3, blockers: &[&Polygon]) -> Option<f32> {
-        if blockers.is_empty() {
-            return Some(open_factor(point, normal, self.polygon.vertices()));
-        }
-        let outline = above_horizon(point, normal, self.polygon.vertices());
-        visible_factor(point, normal, &self.polygon, outline, blockers)
-    }
-
-    /// Lambert's factor times the visible share of the kernel at some points of the patch.
-    fn sampled(
-        &self,
-        point: Vec3,
-        normal: Vec3,
-        samples: &[SamplePoint],
-        visibility: &impl Visibility,
-    ) -> f32 {
-        let above = above_horizon(point, normal, self.polygon.vertices());
-        let open = lambert(normal, &above);
-        if open <= 0.0 {
-            return 0.0;
-        }
-        let visible = self.visible_share(point, normal, samples, visibility);
-        open * visible.unwrap_or_else(|| sees_middle(point, &above, visibility))
-    }
-
-    /// Share of the kernel that is not hidden; `None` when every sample is below the horizon.
-    fn visible_share(
-        &self,
-        point: Vec3,
-        normal: Vec3,
-        samples: &[SamplePoint],
-        visibility: &impl Visibility,
-    ) -> Option<f32> {
-        let (mut seen, mut total) = (0.0, 0.0);
-        for sample in samples {
-            let ray = sample.position - point;
-            let square = ray.length_squared();
-            let cosines = ray.dot(normal) * -ray.dot(self.polygon.normal());
-            if cosines <= 0.0 || square <= f32::MIN_POSITIVE {
-                continue;
-            }
-            let kernel = sample.weight * cosines / (square * square);
-            total += kernel;
-            if visibility.sees(point, sample.position) {
-                seen += kernel;
-            }
-        }
-        (total > 0.0 && total.is_finite()).then(|| (seen / total).min(1.0))
-    }
 }
 
-/// 1 when the middle of what is above the horizon is visible, else 0.
-fn sees_middle(point: Vec3, above: &Clipped, visibility: &impl Visibility) -> f32 {
-    let middle = above.iter().copied().sum::<Vec3>() / above.len().max(1) as f32;
-    f32::from(u8::from(visibility.sees(point, point + middle)))
-}
-
-/// All that a shaft admits; `None` when it is too much to be cut out.
+/// All that a shaft admits; `None` when it is more than [`BLOCKERS`].
 fn blockers(
     shaft: impl FnOnce() -> Shaft,
     visibility: &impl Visibility,
@@ -226,7 +126,7 @@ fn blockers(
     let mut fits = true;
     if visibility.may_block() {
         visibility.between(&shaft(), &mut |blocker| {
-            fits &= blockers.push(blocker).is_ok();
+            fits &= blockers.push(blocker.polygon).is_ok();
         });
     }
     fits.then_some(blockers)
@@ -251,18 +151,33 @@ pub fn fill(
     visibility: &impl Visibility,
     row: &mut [f32],
 ) {
-    fill_with(mesh, first, row, |receiver| {
-        shooter.form_factor(receiver, visibility)
+    let mut near: Option<(u32, View)> = None;
+    fill_with(mesh, first, row, |element, receiver| {
+        // Neighbours are of the same patch, for which what stands between is looked up once.
+        let known = near.take().filter(|(patch, _)| *patch == element.patch);
+        let look_up = || {
+            let patch = mesh.patch_polygon(element.patch)?;
+            Some((element.patch, shooter.seen_by(&patch, visibility)))
+        };
+        near = known.or_else(look_up);
+        near.as_ref().map_or(0.0, |(_, view)| {
+            view.form_factor(&Receiver::new(receiver), visibility)
+        })
     });
 }
 
 /// Fills `row[j]` with what `factor` says of element `first + j`; 0 beyond the mesh.
-fn fill_with(mesh: &Mesh, first: u32, row: &mut [f32], factor: impl Fn(&Polygon) -> f32) {
+fn fill_with(
+    mesh: &Mesh,
+    first: u32,
+    row: &mut [f32],
+    mut factor: impl FnMut(&Element, Polygon) -> f32,
+) {
     let elements = mesh.elements.get(first as usize..).unwrap_or_default();
     row.fill(0.0);
     for (value, element) in row.iter_mut().zip(elements) {
         if let Some(receiver) = mesh.element_polygon(element) {
-            *value = factor(&receiver);
+            *value = factor(element, receiver);
         }
     }
 }

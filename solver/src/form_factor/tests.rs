@@ -4,7 +4,7 @@ use core::f32::consts::PI;
 use super::*;
 use crate::color::Rgb;
 use crate::scene::Surface;
-use crate::visibility::Occluders;
+use crate::visibility::{Obstacle, Occluders, Shaft};
 use proptest::prelude::*;
 use std::vec::Vec;
 
@@ -14,7 +14,7 @@ impl Visibility for Open {
         true
     }
 
-    fn between<'v>(&'v self, _: &Shaft, _: &mut impl FnMut(&'v Polygon)) {}
+    fn between<'v>(&'v self, _: &Shaft, _: &mut impl FnMut(Obstacle<'v>)) {}
 }
 
 /// Unit square at height `z`, facing down.

@@ -45,8 +45,13 @@ impl Plane {
     #[must_use]
     pub fn height(&self, p: Vec3) -> (f32, f32) {
         let height = (p - self.origin).dot(self.normal);
-        let magnitude = p.abs().max_element() + self.origin.abs().max_element();
-        (height, self.flatness + ROUNDINGS * magnitude)
+        (height, self.tolerance(p.abs().max_element()))
+    }
+
+    /// The distance within which the height of a point counts as zero, by its largest coordinate.
+    #[must_use]
+    pub fn tolerance(&self, coordinate: f32) -> f32 {
+        self.flatness + ROUNDINGS * (coordinate + self.origin.abs().max_element())
     }
 }
 
@@ -214,7 +219,7 @@ impl Polygon {
             let twist = (c - d) - (b - a);
             ((b - a) + twist * at.y, (d - a) + twist * at.x)
         };
-        along_s.cross(along_t).length()
+        along_s.cross(along_t).dot(self.normal).abs()
     }
 
     /// The parameters of the point of the polygon's plane nearest to `p`.

@@ -11,6 +11,7 @@
 //! * [`relight_wide`] in integers of any range, which keeps the relative error that
 //!   [`Curve`](crate::code::Curve) proves for the logarithmic code.
 
+mod by_light;
 mod fixed;
 mod float;
 mod frame;
@@ -22,6 +23,7 @@ use core::fmt;
 use crate::atlas::Atlas;
 use crate::color::Rgb;
 
+pub use by_light::{add_lights, change_light, show_sums};
 pub use fixed::{FixedMix, FixedTable, FixedWeight, Terms, change_fixed, relight_fixed};
 pub use float::{DecodeTable, relight};
 pub use frame::{Encode, Finish, FrameLight, FrameMix, Run, STEPS};

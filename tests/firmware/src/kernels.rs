@@ -91,13 +91,25 @@ pub fn run_full<F: Form, const K: usize, const L: usize>(
         for light in 0..K as u32 {
             must(fill_table::<F, L>(&atlas, &mix, light, table));
         }
-        must(full::<F, K, L, _>(&atlas, black_box(table), &finish, pixels));
+        must(full::<F, K, L, _>(
+            &atlas,
+            black_box(table),
+            &finish,
+            pixels,
+        ));
     };
     frame(&first, table, pixels);
     let cold = count(|| frame(&second, table, pixels));
     let cold_hash = hash(pixels);
     pixels.fill(0);
-    let warm = count(|| must(full::<F, K, L, _>(&atlas, black_box(table), &finish, pixels)));
+    let warm = count(|| {
+        must(full::<F, K, L, _>(
+            &atlas,
+            black_box(table),
+            &finish,
+            pixels,
+        ))
+    });
     same(cold_hash, hash(pixels));
     report(cold, warm, cold_hash)
 }

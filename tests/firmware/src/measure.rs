@@ -21,7 +21,9 @@ pub fn count(f: impl FnOnce()) -> u32 {
 /// FNV-1a, 32 bits, of the bytes of pixels, low byte first.
 pub fn hash(pixels: &[u16]) -> u32 {
     let bytes = pixels.iter().flat_map(|pixel| pixel.to_le_bytes());
-    bytes.fold(0x811c_9dc5, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
+    bytes.fold(0x811c_9dc5, |hash, byte| {
+        (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
+    })
 }
 
 /// Memory that is lent once.
@@ -63,7 +65,14 @@ unsafe extern "C" {
 fn stack() -> (*mut u32, *const u32) {
     let (bottom, top) = (&raw mut __sheap, &raw const _stack_start);
     let lowest = (top as usize - PAINTED) as *mut u32;
-    (if (bottom as usize) < lowest as usize { lowest } else { bottom }, top)
+    (
+        if (bottom as usize) < lowest as usize {
+            lowest
+        } else {
+            bottom
+        },
+        top,
+    )
 }
 
 /// Paints what of the stack is free.

@@ -244,7 +244,18 @@ fn job(report: &Report) -> Table {
                 hemicube,
                 job.hemicube_error,
             ),
-            row("hemicubes, converged", None, hemicube, job.converged_error),
+            row(
+                "hemicubes, kept",
+                Some(job.converged[0]),
+                hemicube,
+                job.converged_error,
+            ),
+            row(
+                &format!("hemicubes, {} plain shots", job.shots),
+                Some(job.converged[1]),
+                hemicube,
+                job.converged_error,
+            ),
         ],
     }
 }
@@ -351,6 +362,8 @@ fn json(report: &Report) -> Value {
         "speedup_cached": by_lights(report.cached.iter().map(|c| (c.lights, c.speedup())).collect()),
         "seed_job": {
             "time_ratio_vs_separate_hemicube": job.ours / job.hemicubes,
+            "time_ratio_vs_converged_hemicube": job.ours / job.converged[1],
+            "time_ratio_vs_kept_hemicube": job.ours / job.converged[0],
             "row_time_ratio": job.row[0] / job.row[1],
             "error": job.error.dense_patch,
             "error_fine_rows": job.error.fine,

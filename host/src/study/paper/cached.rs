@@ -13,7 +13,7 @@ use super::rooms::{Room, SPACING, only, room};
 use crate::bake::Memory;
 use crate::bake::{Method, Settings, bake};
 use crate::reference::dense::DenseSolution;
-use crate::rows::{Parallel, RowFiller as _};
+use crate::rows::{Parallel, RowFiller};
 use crate::study::stability::with_reflectance;
 use crate::study::system::{LANES, System, Way};
 
@@ -58,11 +58,11 @@ pub fn measure(lights: u32, repeats: usize) -> Result<Cached> {
     }
     let (mut of_tagged, mut of_separate) = (Vec::new(), Vec::new());
     for _ in 0..repeats {
-        of_tagged.push(tried(|| solve::<LANES>(&tagged, tagged_rows))?);
+        of_tagged.push(tried(|| exact::<LANES>(&tagged, tagged_rows))?);
         of_separate.push(tried(|| {
             alone
                 .iter()
-                .try_for_each(|(room, rows)| solve::<1>(room, *rows))
+                .try_for_each(|(room, rows)| exact::<1>(room, *rows))
         })?);
     }
     Ok(Cached {
@@ -96,10 +96,14 @@ fn rows_needed(room: &Room) -> Result<u32> {
     Ok(rows)
 }
 
-/// The bake's loop on undivided patches and exact rows, of which so many are filled at most.
-pub(super) fn solve<const K: usize>(room: &Room, rows: u32) -> Result<()> {
+fn exact<const K: usize>(room: &Room, rows: u32) -> Result<()> {
+    let filler = Parallel::new(&room.mesh.view(), &room.bvh);
+    solve::<K>(room, &filler, rows)
+}
+
+/// The bake's loop on undivided patches, of whose rows so many are filled at most.
+pub(super) fn solve<const K: usize>(room: &Room, filler: &impl RowFiller, rows: u32) -> Result<()> {
     let mesh = room.mesh.view();
-    let filler = Parallel::new(&mesh, &room.bvh);
     let mut memory = Memory::<K>::new(&mesh, room.lights() as usize, mesh.patches.len(), false);
     let mut refinement = Refinement::new(mesh, room.lights(), RESIDUAL, memory.storage())?;
     let mut row = vec![0.0; mesh.elements.len()];

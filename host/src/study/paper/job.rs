@@ -14,7 +14,7 @@ use relume::scene::Luminaire;
 use relume::visibility::Visibility;
 
 use super::cached::solve;
-use super::clock::{median, published, tried};
+use super::clock::{median, published, seconds, tried};
 use super::rooms::{Room, SPACING, only, room};
 use super::sampling::SHOTS;
 use crate::bvh::Bvh;
@@ -28,6 +28,12 @@ const PARTS: u32 = 4;
 /// Pixels of a hemicube, as published.
 const RESOLUTION: usize = 128;
 
+/// Error of the worst light at which hemicubes count as converged, beside their own solution.
+const CONVERGED: f64 = 0.01;
+
+/// Shots are counted by so many.
+const STEP: u32 = 50;
+
 /// Times and errors of both.
 #[derive(Clone, Debug)]
 pub struct SeedJob {
@@ -37,7 +43,11 @@ pub struct SeedJob {
     pub ours: f64,
     /// Seconds of eight times 100 shots by hemicube.
     pub hemicubes: f64,
-    /// Microseconds of a row of ours, and of a hemicube.
+    /// Seconds of one solve by hemicubes that are kept, and of one by plain shots.
+    pub converged: [f64; 2],
+    /// Plain shots by hemicube until every light is within 1 % of hemicubes without end.
+    pub shots: u32,
+    /// Microseconds of a row of ours, and of a hemicube: means over the patches.
     pub row: [f64; 2],
     /// Errors of ours.
     pub error: Errors,
@@ -68,20 +78,33 @@ pub fn measure(repeats: usize) -> Result<SeedJob> {
 
     let alone = (0..8).map(|light| Room::new(only(&room.scene, light)?, SPACING));
     let alone: Vec<Room> = alone.collect::<Result<_>>()?;
-    let (mut of_ours, mut of_hemicubes, mut of_row) = (Vec::new(), Vec::new(), Vec::new());
-    for _ in 0..repeats {
-        of_ours.push(tried(|| solve::<LANES>(&room, u32::MAX))?);
-        let mut rows = Vec::new();
-        of_hemicubes.push(tried(|| -> Result<()> {
-            for room in &alone {
-                rows.extend(published::<1>(room, &hemicube(room), SHOTS)?.rows);
-            }
-            Ok(())
-        })?);
-        of_row.push(median(rows) * 1e6);
-    }
+    let without_end = converged.dense()?.irradiance;
+    let shots = plain_shots(&converged, &without_end)?;
 
-    let ours = exact.refine(Way::kept(u32::MAX, 1e-6))?;
+    let (ours, theirs) = (Parallel::new(&mesh, &room.bvh), hemicube(&room));
+    let (mut of_ours, mut of_separate) = (Vec::new(), Vec::new());
+    let (mut of_kept, mut of_plain) = (Vec::new(), Vec::new());
+    let mut of_rows = Vec::new();
+    for _ in 0..repeats {
+        of_ours.push(tried(|| {
+            let filler = Parallel::new(&mesh, &room.bvh);
+            solve::<LANES>(&room, &filler, u32::MAX)
+        })?);
+        of_separate.push(tried(|| {
+            let mut solves = alone.iter();
+            solves.try_for_each(|room| published::<1>(room, &hemicube(room), SHOTS).map(drop))
+        })?);
+        of_kept.push(tried(|| solve::<LANES>(&room, &theirs, u32::MAX))?);
+        of_plain.push(tried(|| published::<LANES>(&room, &theirs, shots))?);
+        of_rows.push([row_times(&mesh, &ours), row_times(&mesh, &theirs)]);
+    }
+    let row = [0, 1].map(|which| {
+        let of_patch = |patch: usize| median(of_rows.iter().map(|r| r[which][patch]).collect());
+        let patches = 0..mesh.patches.len();
+        patches.map(of_patch).sum::<f64>() / mesh.patches.len() as f64 * 1e6
+    });
+
+    let solved = exact.refine(Way::kept(u32::MAX, 1e-6))?;
     let mut hundred: Field = vec![Vec::new(); mesh.elements.len()];
     for room in &alone {
         let system = System::new(room.mesh.clone(), 1, &hemicube(room));
@@ -95,16 +118,39 @@ pub fn measure(repeats: usize) -> Result<SeedJob> {
         dense_patch: exact.worst_error(found, &dense_patch),
         fine: exact.worst_error(found, &fine),
     };
-    let time = median(of_ours);
     Ok(SeedJob {
         sums: sum_error(&room, &exact),
-        ours: time,
-        hemicubes: median(of_hemicubes),
-        row: [time / ours.shooters.len() as f64 * 1e6, median(of_row)],
-        error: errors(&ours.irradiance),
+        ours: median(of_ours),
+        hemicubes: median(of_separate),
+        converged: [median(of_kept), median(of_plain)],
+        shots,
+        row,
+        error: errors(&solved.irradiance),
         hemicube_error: errors(&hundred),
-        converged_error: errors(&converged.dense()?.irradiance),
+        converged_error: errors(&without_end),
     })
+}
+
+/// Seconds of the row of every patch.
+fn row_times(mesh: &Mesh, filler: &impl RowFiller) -> Vec<f64> {
+    let mut row = vec![0.0; mesh.elements.len()];
+    let patches = 0..mesh.patches.len() as u32;
+    patches
+        .map(|patch| seconds(|| filler.patch(mesh, patch, &mut row)))
+        .collect()
+}
+
+/// Plain shots until the worst light is within [`CONVERGED`], to [`STEP`].
+fn plain_shots(system: &System, without_end: &Field) -> Result<u32> {
+    let mut shots = STEP;
+    loop {
+        let found = system.refine(Way::published(shots, 1e-9))?;
+        let is_close = system.worst_error(&found.irradiance, without_end) <= CONVERGED;
+        if is_close || (found.shooters.len() as u32) < shots {
+            return Ok(shots);
+        }
+        shots += STEP;
+    }
 }
 
 /// Largest difference from one of what an element sees: all patches, and the backs of the lamps, which

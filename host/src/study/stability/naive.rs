@@ -6,7 +6,7 @@ use relume::geometry::Polygon;
 use relume::luminaire;
 use relume::mesh::Mesh;
 use relume::scene::{Luminaire, Surface};
-use relume::visibility::{Occluders, Shaft, Visibility};
+use relume::visibility::{Obstacle, Occluders, Shaft, Visibility};
 
 use crate::rows::RowFiller;
 use crate::study::system::System;
@@ -89,7 +89,7 @@ impl Visibility for EpsilonRays<'_> {
         !polygons.any(|polygon| Self::meets(polygon, from, to))
     }
 
-    fn between<'v>(&'v self, _: &Shaft, _: &mut impl FnMut(&'v Polygon)) {}
+    fn between<'v>(&'v self, _: &Shaft, _: &mut impl FnMut(Obstacle<'v>)) {}
 }
 
 /// The same rows, all longer or shorter by a factor.

@@ -7,11 +7,25 @@
 //! Assumption: every surface blocks light from both sides; end points lie on surfaces or in free
 //! space. A surface that contains an end point (to within rounding) does not hide it.
 
+mod body;
+
 use glam::{Vec2, Vec3};
 use heapless::Vec;
 
 use crate::geometry::{Plane, Polygon};
 use crate::scene::Surface;
+
+pub(crate) use body::FACES;
+pub use body::{Body, bodies};
+
+/// A surface that may hide something.
+#[derive(Clone, Copy, Debug)]
+pub struct Obstacle<'v> {
+    /// Its outline.
+    pub polygon: &'v Polygon,
+    /// The body that it is a face of, which hides what each of its faces hides.
+    pub body: Option<&'v Body>,
+}
 
 /// Tells who stands between two points or two polygons.
 pub trait Visibility {
@@ -24,15 +38,12 @@ pub trait Visibility {
     }
 
     /// Visits every surface that [`Shaft::admits`], in the order of their numbers.
-    fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(&'v Polygon));
+    fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(Obstacle<'v>));
 }
 
 /// Every surface of a scene, asked one after the other: work grows with their number.
 #[derive(Clone, Copy, Debug)]
-pub struct Occluders<'a>(
-    /// The surfaces that block.
-    pub &'a [Surface],
-);
+pub struct Occluders<'a>(pub &'a [Surface]);
 
 impl Visibility for Occluders<'_> {
     fn sees(&self, from: Vec3, to: Vec3) -> bool {
@@ -42,12 +53,39 @@ impl Visibility for Occluders<'_> {
             .any(|surface| surface.polygon().crossing(from, to).is_some())
     }
 
-    fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(&'v Polygon)) {
-        self.0
-            .iter()
-            .map(Surface::polygon)
-            .filter(|polygon| shaft.admits(polygon))
-            .for_each(visit);
+    fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(Obstacle<'v>)) {
+        let polygons = self.0.iter().map(Surface::polygon);
+        for polygon in polygons.filter(|polygon| shaft.admits(polygon)) {
+            let body = None;
+            visit(Obstacle { polygon, body });
+        }
+    }
+}
+
+/// The same, where the closed convex [`bodies`] among the surfaces are known: what is hidden is the same but
+/// for rounding, and found with less work.
+#[derive(Clone, Copy, Debug)]
+pub struct OccludersAndBodies<'a> {
+    /// The surfaces.
+    pub surfaces: &'a [Surface],
+    /// The bodies among them.
+    pub bodies: &'a [Body],
+}
+
+impl Visibility for OccludersAndBodies<'_> {
+    fn sees(&self, from: Vec3, to: Vec3) -> bool {
+        Occluders(self.surfaces).sees(from, to)
+    }
+
+    fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(Obstacle<'v>)) {
+        for (surface, number) in self.surfaces.iter().zip(0..) {
+            let polygon = surface.polygon();
+            if shaft.admits(polygon) {
+                let mut bodies = self.bodies.iter();
+                let body = bodies.find(|body| body.surfaces().contains(&number));
+                visit(Obstacle { polygon, body });
+            }
+        }
     }
 }
 
@@ -198,9 +236,9 @@ impl Shaft {
                 height > tolerance
             })
         };
-        !self.misses(Bounds::of(surface))
+        self.is_cut_by(&surface.plane())
             && self.planes.iter().all(is_in_front)
-            && self.is_cut_by(&surface.plane())
+            && !self.misses(Bounds::of(surface))
     }
 
     /// True when the ends lie on both sides of a plane.
