@@ -68,7 +68,9 @@ impl Rgb {
     /// True when every channel is finite and not negative.
     #[must_use]
     pub fn is_legal(self) -> bool {
-        self.to_array().iter().all(|c| c.is_finite() && *c >= 0.0)
+        // By their bits, so that a reader needs no float arithmetic: up to the largest float, or -0.
+        let is_legal = |bits| bits < 0x7f80_0000 || bits == 0x8000_0000;
+        self.to_array().iter().all(|c| is_legal(c.to_bits()))
     }
 
     /// Applies `f` to each channel.

@@ -5,8 +5,10 @@
 
 use core::f32::consts::FRAC_1_PI;
 
+use crate::code::srgb_linear;
 use crate::color::Rgb;
 use crate::math;
+use crate::relight::{Encode, STEPS};
 
 /// Radiance of a diffuse surface, W/m2/sr, from its reflectance, its irradiance and its exitance
 /// in W/m2.
@@ -82,6 +84,97 @@ impl Exposure {
         // Casts saturate; the values lie in [0, 255].
         (encoded * steps).to_array().map(|v| math::round(v) as u8)
     }
+}
+
+/// Linear steps to RGB565 by look-up, without floats: every step as its middle is encoded.
+#[derive(Clone, Debug)]
+pub struct Rgb565Table {
+    white: u16,
+    five: [u8; STEPS as usize],
+    six: [u8; STEPS as usize],
+}
+
+impl Rgb565Table {
+    /// The table in which white begins at a step, at least 1: what lies above it is white, too.
+    #[must_use]
+    pub const fn new(white: u16) -> Self {
+        Self {
+            white,
+            five: encoded_steps(white, 31),
+            six: encoded_steps(white, 63),
+        }
+    }
+}
+
+impl Encode for Rgb565Table {
+    type Pixel = u16;
+
+    fn white(&self) -> u16 {
+        self.white
+    }
+
+    #[inline(always)]
+    fn encode(&self, [r, g, b]: [u32; 3]) -> u16 {
+        let [r, b] = [r, b].map(|step| step_of(&self.five, step));
+        b | step_of(&self.six, g) << 5 | r << 11
+    }
+}
+
+/// Linear steps to three bytes of sRGB by look-up.
+#[derive(Clone, Debug)]
+pub struct Rgb888Table {
+    white: u16,
+    eight: [u8; STEPS as usize],
+}
+
+impl Rgb888Table {
+    /// The table in which white begins at a step, at least 1.
+    #[must_use]
+    pub const fn new(white: u16) -> Self {
+        Self {
+            white,
+            eight: encoded_steps(white, 255),
+        }
+    }
+}
+
+impl Encode for Rgb888Table {
+    type Pixel = [u8; 3];
+
+    fn white(&self) -> u16 {
+        self.white
+    }
+
+    #[inline(always)]
+    fn encode(&self, steps: [u32; 3]) -> [u8; 3] {
+        steps.map(|step| step_of(&self.eight, step) as u8)
+    }
+}
+
+#[inline(always)]
+fn step_of(table: &[u8; STEPS as usize], step: u32) -> u16 {
+    // Not reached by the kernels, whose steps have 11 bits.
+    u16::from(table.get(step as usize).copied().unwrap_or(u8::MAX))
+}
+
+/// The sRGB value, in `[0, levels]`, of the middle of every step.
+const fn encoded_steps(white: u16, levels: u32) -> [u8; STEPS as usize] {
+    let mut table = [0; STEPS as usize];
+    let (mut rest, mut step, mut level) = (table.as_mut_slice(), 1, 0);
+    while let Some((entry, after)) = rest.split_first_mut() {
+        // A level begins in the middle between it and the one below, in 2^-12 of 255 codes.
+        while level < levels {
+            let begin = srgb_linear((2 * level + 1) * (255 << 11) / levels) as u64;
+            // `(step / 2) / white < begin / 2^31`
+            if (step as u64) << 31 < 2 * begin * white as u64 {
+                break;
+            }
+            level += 1;
+        }
+        *entry = level as u8;
+        (rest, step) = (after, step + 2);
+    }
+    table
 }
 
 #[cfg(test)]

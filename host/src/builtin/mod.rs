@@ -1,9 +1,10 @@
-//! Scenes that need no file: the Cornell box, the paper's room, white furnaces.
+//! Scenes that need no file: the Cornell box, the paper's room, a flat, white furnaces.
 //!
 //! Each comes with the spacing and the view that suit it. Lengths are in metres, `y` is up, and
 //! fronts (counter-clockwise) face the lit side.
 
 mod cornell;
+mod flat;
 mod furnace;
 mod paper;
 #[cfg(test)]
@@ -18,6 +19,7 @@ use relume::scene::{Emission, Luminaire, LuminaireError, Source, Surface, Surfac
 use crate::scene::{Light, OwnedScene};
 
 pub use cornell::cornell_box;
+pub use flat::flat;
 pub use furnace::{furnace_with_box, white_furnace};
 pub use paper::{PaperLamps, paper_room};
 

@@ -19,7 +19,7 @@ use super::{Outcome, human_bytes, tell, write_file};
 use crate::bake::{Settings, bake_keeping};
 use crate::builtin::{Builtin, cornell_box};
 use crate::display_error::{Mixed, Solo, max_codes};
-use crate::export::exr;
+use crate::export::{exr, light_layers};
 use crate::mix::{Setting, mix};
 use crate::pack::{Aim, Choice, Packing, PackingError, Request, choose, relight_atlas};
 use crate::picture::{self, Exposure, LinearImage, Tile, error_map, sheet};
@@ -196,7 +196,7 @@ fn make(folder: &mut Folder) -> Result<serde_json::Value> {
             error.worst_state.clone_from(&relit.name);
         }
     }
-    light_layers(&stage, folder)?;
+    write_layers(&stage, folder)?;
     let report = report(
         &baked,
         &error,
@@ -276,16 +276,10 @@ fn pictures(stage: &Stage, folder: &mut Folder) -> Result<Vec<Relighting>> {
 }
 
 /// One linear layer per light at nominal emission, and the picture of all together.
-fn light_layers(stage: &Stage, folder: &mut Folder) -> Result<()> {
-    let nominal = stage.solution.nominal_mix();
-    let mut layers = Vec::new();
-    for (light, tag) in stage.solution.lights.iter().zip(0..) {
-        let mut only = vec![Rgb::BLACK; nominal.len()];
-        only[tag] = nominal[tag];
-        let image = stage.image(&stage.solution.relight(&only), &only)?;
-        layers.push((light.name.clone(), image));
-    }
+fn write_layers(stage: &Stage, folder: &mut Folder) -> Result<()> {
+    let layers = light_layers::layers(stage.solution, &stage.camera, f32::INFINITY)?;
     folder.write("lights.exr", &exr::encode_light_layers(&layers)?)?;
+    let nominal = stage.solution.nominal_mix();
     let all_on = stage.image(&stage.solution.relight(&nominal), &nominal)?;
     folder.write("all-on.exr", &exr::encode_rgb(&all_on)?)
 }

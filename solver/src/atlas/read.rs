@@ -36,6 +36,23 @@ impl<'a> Atlas<'a> {
     /// # Errors
     /// [`AtlasError`]: what is wrong with the bytes.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, AtlasError> {
+        let (atlas, mesh) = Self::parse_parts(bytes)?;
+        if let Some(mesh) = mesh {
+            mesh.check(atlas.counts.lights)?;
+        }
+        Ok(Self { mesh, ..atlas })
+    }
+
+    /// The same without the mesh, which is left unread: this takes no float arithmetic.
+    ///
+    /// # Errors
+    /// [`AtlasError`]: what is wrong with the bytes before the mesh, or with all of them by their checksum.
+    pub fn parse_codes(bytes: &'a [u8]) -> Result<Self, AtlasError> {
+        Ok(Self::parse_parts(bytes)?.0)
+    }
+
+    /// The atlas without its mesh, and the mesh, not checked yet.
+    fn parse_parts(bytes: &'a [u8]) -> Result<(Self, Option<AtlasMesh<'a>>), AtlasError> {
         let header = Header::parse(bytes)?;
         let counts = header.counts;
         // Else any number of elements would fit into a file of no size.
@@ -92,17 +109,15 @@ impl<'a> Atlas<'a> {
             stride,
             codes: part(needed.codes, needed.tiles),
             tiles: tiles.transpose()?,
-            mesh: (counts.faces > 0).then(|| AtlasMesh {
-                surfaces: part(needed.surfaces, needed.faces),
-                faces: part(needed.faces, needed.elements),
-                elements: part(needed.elements, needed.end),
-            }),
+            mesh: None,
         };
         atlas.check_lights()?;
-        if let Some(mesh) = atlas.mesh {
-            mesh.check(counts.lights)?;
-        }
-        Ok(atlas)
+        let mesh = (counts.faces > 0).then(|| AtlasMesh {
+            surfaces: part(needed.surfaces, needed.faces),
+            faces: part(needed.faces, needed.elements),
+            elements: part(needed.elements, needed.end),
+        });
+        Ok((atlas, mesh))
     }
 
     fn check_lights(&self) -> Result<(), AtlasError> {
@@ -173,6 +188,13 @@ impl<'a> Atlas<'a> {
                 error: record.error,
             })
         })
+    }
+
+    /// What the codes of a light stand for, and the largest of each channel; `None` without such a light.
+    #[must_use]
+    pub fn curves(&self, light: u32) -> Option<([Curve; 3], [u16; 3])> {
+        let record = LightRecord::parse(record(self.lights, light, LIGHT_BYTES))?;
+        Some((record.curves, record.last))
     }
 
     /// One more than the largest code of any light.
@@ -271,6 +293,11 @@ impl<'a> Atlas<'a> {
                 }
             }
         }
+    }
+
+    /// Whether all lights are in codes for which `f` holds; looks at nothing else of them.
+    pub fn is_all_in(&self, f: impl Fn(Code) -> bool) -> bool {
+        self.records().all(|record| code_of(record).is_some_and(&f))
     }
 
     fn records(&self) -> impl Iterator<Item = &'a [u8; LIGHT_BYTES]> + use<'a> {
@@ -452,10 +479,9 @@ impl Header {
 
 /// An error from its bits, `None` inside when nobody measured it; `None` outside when it is illegal.
 fn error(bits: u32) -> Option<Option<f32>> {
-    let error = f32::from_bits(bits);
     match bits {
         NOT_MEASURED => Some(None),
-        _ if error.is_finite() && error >= 0.0 => Some(Some(error)),
+        _ if bits < f32::INFINITY.to_bits() => Some(Some(f32::from_bits(bits))),
         _ => None,
     }
 }
@@ -517,7 +543,7 @@ fn curve(code: Code, input: &mut Input) -> Option<(Curve, u16)> {
     } else {
         last == u16::from(u8::MAX)
     };
-    (is_legal && curve.decode(last).is_finite()).then_some((curve, last))
+    (is_legal && curve.reaches(last)).then_some((curve, last))
 }
 
 /// The code of light `tag` of a table of lights; `None` when there is no such code.

@@ -28,6 +28,8 @@
 //! ones, as many as `(z + 8) >> 3` has bits but one, a zero, and the bits of `z + 8` below its highest); then, unless `m = 15`,
 //! the others: [`ESCAPE`] ones stand before 18 bits of `z` itself. Bits past the end are 0.
 
+use core::num::NonZeroU16;
+
 use super::AtlasError;
 
 /// Most elements along a tile.
@@ -71,6 +73,11 @@ pub struct Place {
 }
 
 impl Place {
+    /// How many elements it has.
+    pub(crate) const fn len(self) -> usize {
+        self.columns as usize * self.rows as usize
+    }
+
     /// Its elements, row by row.
     pub fn elements(self) -> impl Iterator<Item = u32> {
         let row = move |row: u32| self.first + row * self.stride;
@@ -113,7 +120,7 @@ impl<'a> Tiles<'a> {
             }
             held += u64::from(width) * u64::from(height);
             let (along, down) = sides(tiles.side, height);
-            count += u64::from(width.div_ceil(along)) * u64::from(height.div_ceil(down));
+            count += u64::from(parts(width, along)) * u64::from(parts(height, down));
         }
         let offsets = tiles.offsets.as_chunks::<4>().0;
         let is_inside = |offset: &[u8; 4]| u32::from_le_bytes(*offset) as usize <= bits.len();
@@ -170,25 +177,35 @@ pub fn places(grids: impl Iterator<Item = [u16; 2]>, side: u16) -> impl Iterator
     });
     starts.flat_map(move |(first, width, height)| {
         let (along, down) = sides(side, height);
-        (0..height).step_by(down.into()).flat_map(move |y| {
-            (0..width).step_by(along.into()).map(move |x| Place {
+        // No part begins beyond the end, which has 16 bits.
+        let begins =
+            |length, part: NonZeroU16| (0..parts(length, part)).map(move |i| i * part.get());
+        begins(height, down).flat_map(move |y| {
+            begins(width, along).map(move |x| Place {
                 first: first + u32::from(y) * u32::from(width) + u32::from(x),
                 stride: width.into(),
-                columns: along.min(width - x),
-                rows: down.min(height - y),
+                columns: along.get().min(width - x),
+                rows: down.get().min(height - y),
             })
         })
     })
 }
 
+/// Parts of a length, the last of which may be shorter.
+fn parts(length: u16, part: NonZeroU16) -> u16 {
+    length / part + u16::from(!length.is_multiple_of(part.get()))
+}
+
 /// Columns and rows of a tile in a grid of this height.
-fn sides(side: u16, height: u16) -> (u16, u16) {
+fn sides(side: u16, height: u16) -> (NonZeroU16, NonZeroU16) {
     let side = side.clamp(1, LARGEST_SIDE as u16);
-    if height == 1 {
+    let (along, down) = if height == 1 {
         (side * side, 1)
     } else {
         (side, side)
-    }
+    };
+    let least_one = |length| NonZeroU16::new(length).unwrap_or(NonZeroU16::MIN);
+    (least_one(along), least_one(down))
 }
 
 /// The bits of a tile that are still to be read, light after light.

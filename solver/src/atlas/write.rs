@@ -249,7 +249,7 @@ fn put_curve(code: Code, curve: Curve, last: u16, output: &mut Output) -> Result
     } else {
         last == u16::from(u8::MAX)
     };
-    if !is_legal || !curve.decode(last).is_finite() {
+    if !is_legal || !curve.reaches(last) {
         return Err(AtlasError::Unfit(
             "a contribution beyond its code; change the emission",
         ));

@@ -138,10 +138,15 @@ impl Curve {
     /// What multiplies [`Self::magnitude`]: the scale, the white, or 1.
     #[must_use]
     pub fn factor(&self) -> f32 {
-        match self {
-            Self::Exponential { scale } => scale.value(),
-            Self::Display { white, .. } => white.value(),
-            Self::Logarithmic { .. } => 1.0,
+        self.scale().value()
+    }
+
+    /// [`Self::factor`], without floats.
+    #[must_use]
+    pub const fn scale(&self) -> Scale {
+        match *self {
+            Self::Exponential { scale } | Self::Display { white: scale, .. } => scale,
+            Self::Logarithmic { .. } => Scale::ONE,
         }
     }
 
@@ -169,6 +174,16 @@ impl Curve {
                 power(level / LOG_STEPS, fraction, LOG_BEGIN)
             }
         }
+    }
+
+    /// Whether a code has a value below 2^127, and so has its [`Self::magnitude`]; without floats.
+    #[must_use]
+    pub fn reaches(&self, code: u16) -> bool {
+        let (value, scale) = (self.magnitude(code), self.scale());
+        let octave = |mantissa: u64, exponent: i32| 64 - mantissa.leading_zeros() as i32 + exponent;
+        let product = u64::from(value.mantissa) * u64::from(scale.mantissa());
+        octave(value.mantissa.into(), value.exponent) <= 127
+            && octave(product, value.exponent + i32::from(scale.exponent())) <= 127
     }
 
     /// The value of a code, at unit emission.
@@ -262,14 +277,23 @@ fn display_magnitude(units: u32) -> Magnitude {
         let fraction = (octaves >> 17) as u32 & ((1 << 23) - 1);
         return power((octaves >> 40) as u32, fraction, 0);
     }
-    let (index, rest) = (units / UNITS, units % UNITS);
-    let entry = |index: u32| u64::from(SRGB.get(index as usize).copied().unwrap_or(1 << 31));
-    let (low, high) = (entry(index), entry(index + 1));
-    let mantissa = low + (((high - low) * u64::from(rest)) >> 12);
     Magnitude {
-        mantissa: mantissa as u32,
+        mantissa: srgb_linear(units),
         exponent: -31,
     }
+}
+
+/// Linear value of an sRGB code, white = 2^31; the code in units of 2^-12, at most 255.
+#[must_use]
+pub const fn srgb_linear(units: u32) -> u32 {
+    let (index, rest) = (units / UNITS, units % UNITS);
+    if index >= WHITE {
+        return 1 << 31;
+    }
+    // The index is below the last of 256 entries.
+    #[allow(clippy::indexing_slicing)]
+    let (low, high) = (SRGB[index as usize], SRGB[index as usize + 1]);
+    low + ((high - low) as u64 * rest as u64 >> 12) as u32
 }
 
 /// `2^(octave + fraction 2^-23 + begin)`.

@@ -24,7 +24,7 @@ mod tables;
 
 use core::fmt;
 
-pub use curve::{Curve, LOG_STEPS, Magnitude, display_code};
+pub use curve::{Curve, LOG_STEPS, Magnitude, display_code, srgb_linear};
 pub use exponential::{
     DECODED, DECODED_BITS, LARGEST, SATURATED, decode, decode_fixed, encode, error_bound,
 };

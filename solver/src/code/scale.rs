@@ -68,8 +68,9 @@ impl Scale {
     /// finite, normal `f32`.
     #[must_use]
     pub fn from_parts(mantissa: u16, exponent: i16) -> Option<Self> {
-        let scale = Self { mantissa, exponent };
-        (mantissa >= 1 << 15 && scale.value().is_normal()).then_some(scale)
+        // From 2^15 2^-141, the smallest normal float, to below 2^16 2^112.
+        let is_normal = mantissa >= 1 << 15 && (-141..=112).contains(&exponent);
+        is_normal.then_some(Self { mantissa, exponent })
     }
 
     /// Mantissa, in [32 768, 65 535].

@@ -11,8 +11,11 @@
 //! * [`relight_wide`] in integers of any range, which keeps the relative error that
 //!   [`Curve`](crate::code::Curve) proves for the logarithmic code.
 
+mod by_light;
 mod fixed;
 mod float;
+mod frame;
+mod packed;
 mod wide;
 
 use core::fmt;
@@ -20,8 +23,11 @@ use core::fmt;
 use crate::atlas::Atlas;
 use crate::color::Rgb;
 
+pub use by_light::{add_lights, change_light, show_sums};
 pub use fixed::{FixedMix, FixedTable, FixedWeight, Terms, change_fixed, relight_fixed};
 pub use float::{DecodeTable, relight};
+pub use frame::{Encode, Finish, FrameLight, FrameMix, Run, STEPS};
+pub use packed::{AnyTable, Colour, Form, Lum, Sums, fill_table, full, full_any};
 pub use wide::{Wide, WideWeight, relight_wide};
 
 /// Why a relight cannot be done.
@@ -48,8 +54,11 @@ pub enum RelightError {
         /// Entries that are needed.
         needed: usize,
     },
-    /// The mix is too bright for the fixed-point range; start again with [`FixedMix::new`].
+    /// The mix is too bright for the fixed-point range; start again with [`FixedMix::new`] or [`FrameMix::new`], or with a
+    /// dimmer exposure.
     Range,
+    /// The codes of the atlas are not those that a kernel reads.
+    Code,
 }
 
 impl fmt::Display for RelightError {
@@ -64,6 +73,7 @@ impl fmt::Display for RelightError {
             }
             Self::Table { needed } => write!(f, "the table needs {needed} entries"),
             Self::Range => f.write_str("the mix is too bright for the fixed-point range"),
+            Self::Code => f.write_str("the atlas is in other codes than this kernel reads"),
         }
     }
 }
@@ -142,3 +152,6 @@ fn check_elements(atlas: &Atlas, found: usize) -> Result<(), RelightError> {
 
 #[cfg(test)]
 mod tests;
+
+#[cfg(test)]
+mod packed_tests;

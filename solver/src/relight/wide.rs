@@ -23,7 +23,7 @@ impl Wide {
     });
 
     /// `mantissa * 2^exponent`, cut to 32 bits.
-    const fn new(mantissa: u64, exponent: i32) -> Self {
+    pub(super) const fn new(mantissa: u64, exponent: i32) -> Self {
         if mantissa == 0 {
             return Self::ZERO;
         }
@@ -56,6 +56,20 @@ impl Wide {
     pub const fn times(self, other: Self) -> Self {
         let product = self.0.mantissa as u64 * other.0.mantissa as u64;
         Self::new(product, self.0.exponent + other.0.exponent)
+    }
+
+    /// The quotient of two; 0 for a divisor of 0.
+    pub(super) const fn over(self, other: Self) -> Self {
+        let quotient = (self.0.mantissa as u64) << 32;
+        match quotient.checked_div(other.0.mantissa as u64) {
+            Some(quotient) => Self::new(quotient, self.0.exponent - other.0.exponent - 32),
+            None => Self::ZERO,
+        }
+    }
+
+    /// The value times a power of two.
+    pub(super) const fn scaled(self, exponent: i32) -> Self {
+        Self::new(self.0.mantissa as u64, self.0.exponent + exponent)
     }
 
     /// The sum of two.

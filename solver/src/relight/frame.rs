@@ -1,0 +1,470 @@
+//! A mix, a unit and reflectances in whole numbers: what the frame kernels ([`packed`](super::packed)) work with.
+//!
+//! A *level* of 16 bits is a light's share of its full weight, channel by channel; with all lights at their
+//! full weights the brightest element reaches the *full scale* `S` (W/m2, one per channel). A contribution is
+//! `t = round(2^b g l x)`, with `b` bits for a sum, the level `l`, the value `x` of the code in 16 bits and the light's
+//! gain `g = w s / (S 2^16)` (full weight `w`, scale `s` of the curve) in a mantissa of 16 bits. Sums of `t`
+//! cannot reach `2^b`, whatever the levels: the full scale leaves room for half a unit per light.
+//!
+//! What is shown of a sum is `i = floor(2^-(b + 5) q sum)`, one of [`STEPS`] linear steps, where `q` of 16 bits holds
+//! reflectance, exposure and `1 / pi`; [`Encode`] makes a pixel of three such steps.
+//!
+//! Error of a sum, in units of `2^-b S`: half for every light that is on, and of the sum itself `2^-14` by
+//! the mantissas. Nothing here computes with floats: those that an atlas stores are taken apart bit by bit.
+
+use core::f32::consts::FRAC_1_PI;
+use core::num::NonZeroUsize;
+
+use super::{RelightError, Wide, check_lights};
+use crate::atlas::{Atlas, AtlasLight, Block, LARGEST_SIDE, Tiles};
+use crate::code::{Curve, DECODED, DECODED_BITS, Magnitude, Scale};
+use crate::color::Rgb;
+
+/// Linear steps from black up that a display encodes.
+pub const STEPS: u32 = 2048;
+
+/// Bits of a value, a level, a gain, a reflectance.
+const BITS: i32 = 16;
+
+/// Where the values of the exponential code have 16 bits already.
+const EXPONENTIAL: i32 = -(DECODED_BITS as i32);
+
+/// Elements that are looked at together.
+const CHUNK: usize = 16;
+
+/// The fewest bits of a sum.
+pub(super) const FEWEST_BITS: u32 = 10;
+
+/// Makes a pixel of linear light.
+pub trait Encode {
+    /// What a display takes.
+    type Pixel: Copy;
+
+    /// The step at which white begins.
+    fn white(&self) -> u16;
+
+    /// The pixel of linear steps below [`STEPS`]; larger ones are taken as the last.
+    fn encode(&self, steps: [u32; 3]) -> Self::Pixel;
+}
+
+/// A positive factor or nothing: `mantissa * 2^exponent`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Gain {
+    mantissa: u16,
+    exponent: i16,
+}
+
+impl Gain {
+    const ZERO: Self = Self {
+        mantissa: 0,
+        exponent: 0,
+    };
+
+    fn new(value: Wide) -> Self {
+        let Magnitude { mantissa, exponent } = value.magnitude();
+        Self {
+            mantissa: (mantissa >> 16) as u16,
+            exponent: (exponent + 16).clamp(i16::MIN.into(), i16::MAX.into()) as i16,
+        }
+    }
+
+    /// The factor times a level, for sums of so many bits.
+    pub(super) fn weight(self, level: u16, bits: u32) -> Weight {
+        let product = u32::from(self.mantissa) * u32::from(level);
+        let excess = 16_u32.saturating_sub(product.leading_zeros());
+        let shift = -(i32::from(self.exponent) + excess as i32 + bits as i32);
+        match u32::try_from(shift) {
+            Ok(shift @ 2..=32) => Weight {
+                mantissa: product >> excess,
+                shift,
+            },
+            _ => Weight::ZERO,
+        }
+    }
+}
+
+/// What multiplies a value of 16 bits: `mantissa * 2^-shift`, rounded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Weight {
+    /// Below 2^16.
+    mantissa: u32,
+    /// From 2 to 32.
+    shift: u32,
+}
+
+impl Weight {
+    pub(super) const ZERO: Self = Self {
+        mantissa: 0,
+        shift: 2,
+    };
+
+    /// The product; halves round up.
+    pub(super) const fn of(self, value: u32) -> u32 {
+        (((self.mantissa * value) >> (self.shift - 1)) + 1) >> 1
+    }
+}
+
+/// The values of a curve in 16 bits, times `2^exponent`.
+#[derive(Clone, Copy, Debug)]
+pub struct Values {
+    curve: Curve,
+    last: u16,
+    exponent: i32,
+}
+
+impl Values {
+    pub(super) fn new(curve: Curve, last: u16) -> Self {
+        let largest = curve.magnitude(last);
+        let excess = 16 - largest.mantissa.leading_zeros() as i32;
+        Self {
+            curve,
+            last,
+            exponent: largest.exponent + excess,
+        }
+    }
+
+    /// Calls `f` with one entry and value after the other, from code 0 on.
+    #[inline(always)]
+    pub(super) fn with_codes<E>(
+        &self,
+        entries: impl Iterator<Item = E>,
+        mut f: impl FnMut(E, u32),
+    ) {
+        if matches!(self.curve, Curve::Exponential { .. }) && self.exponent == EXPONENTIAL {
+            for (entry, value) in entries.zip(&DECODED) {
+                f(entry, u32::from(*value));
+            }
+        } else {
+            for (entry, code) in entries.zip(0..) {
+                f(entry, self.of(code));
+            }
+        }
+    }
+
+    /// Below 2^16.
+    pub(super) fn of(&self, code: u16) -> u32 {
+        let value = self.curve.magnitude(code.min(self.last));
+        let shift = self.exponent - value.exponent;
+        let distance = shift.unsigned_abs();
+        if shift < 0 {
+            value.mantissa << (distance & 15)
+        } else {
+            value.mantissa.checked_shr(distance).unwrap_or(0)
+        }
+    }
+}
+
+/// A light of a frame: its gain and its level.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrameLight {
+    gains: [Gain; 3],
+    levels: [u16; 3],
+}
+
+impl FrameLight {
+    /// A light that gives nothing: room for [`FrameMix::new`].
+    pub const EMPTY: Self = Self {
+        gains: [Gain::ZERO; 3],
+        levels: [0; 3],
+    };
+}
+
+/// A mix in levels.
+#[derive(Debug)]
+pub struct FrameMix<'a> {
+    lights: &'a mut [FrameLight],
+    /// W/m2.
+    full_scale: [Wide; 3],
+}
+
+impl<'a> FrameMix<'a> {
+    /// Fits the unit of every sum to `full`, the largest weight of every light; all lights are off.
+    ///
+    /// Looks once at every contribution. `lights` is room for one entry per light.
+    ///
+    /// # Errors
+    /// Slices that do not fit the atlas; weights that are negative or not finite; [`RelightError::Range`] with more than 1000
+    /// lights.
+    pub fn new(
+        atlas: &Atlas,
+        full: &[Rgb],
+        lights: &'a mut [FrameLight],
+    ) -> Result<Self, RelightError> {
+        super::check_mix(atlas, full)?;
+        check_lights(atlas, lights.len())?;
+        if full.len() > 1000 {
+            return Err(RelightError::Range);
+        }
+        let mut mix = Self {
+            lights,
+            full_scale: [Wide::ZERO; 3],
+        };
+        for (light, full) in atlas.lights().zip(full) {
+            let values = light.curves.iter().zip(light.last);
+            let channels = mix.full_scale.iter_mut().zip(full.to_array()).zip(values);
+            for ((scale, full), (curve, last)) in channels {
+                let values = Values::new(*curve, last);
+                let largest = Wide::new(values.of(last).into(), 0);
+                *scale = scale.plus(unit(full, curve.scale(), &values).times(largest));
+            }
+        }
+        mix.fill_gains(atlas, full);
+        // With every light by itself at its largest, some element is the brightest.
+        let brightest = mix.brightest(atlas);
+        let room = (1 << FEWEST_BITS) - 2 - full.len() as u32 / 2;
+        for (scale, brightest) in mix.full_scale.iter_mut().zip(brightest) {
+            let brightest = u64::from(brightest) + full.len() as u64;
+            let grown = Wide::new(brightest << FEWEST_BITS, -BITS);
+            let fits = grown.over(Wide::new(room.into(), 0));
+            *scale = scale.times(fits);
+        }
+        mix.fill_gains(atlas, full);
+        Ok(mix)
+    }
+
+    /// Gains at the present full scale; levels become 0.
+    fn fill_gains(&mut self, atlas: &Atlas, full: &[Rgb]) {
+        let entries = self.lights.iter_mut().zip(atlas.lights()).zip(full);
+        for ((entry, light), full) in entries {
+            *entry = FrameLight::EMPTY;
+            let values = light.curves.iter().zip(light.last);
+            let channels = entry.gains.iter_mut().zip(self.full_scale);
+            for (((gain, scale), full), (curve, last)) in channels.zip(full.to_array()).zip(values)
+            {
+                let values = Values::new(*curve, last);
+                *gain = Gain::new(unit(full, curve.scale(), &values).over(scale).scaled(-BITS));
+            }
+        }
+    }
+
+    /// The largest sum of every channel with all lights at their full weights, in 2^-16 of the full scale.
+    fn brightest(&self, atlas: &Atlas) -> [u32; 3] {
+        let mut brightest = self.brightest_of_rows(atlas);
+        if let Some(tiles) = atlas.tiles() {
+            let in_tiles = self.brightest_of_tiles(atlas, &tiles);
+            // No element has more of both.
+            for (sum, other) in brightest.iter_mut().zip(in_tiles) {
+                *sum += other;
+            }
+        }
+        brightest
+    }
+
+    /// Of the lights in tiles. Its stack of 5 KB is its own.
+    #[inline(never)]
+    fn brightest_of_tiles(&self, atlas: &Atlas, tiles: &Tiles) -> [u32; 3] {
+        let mut brightest = [0; 3];
+        let mut block: Block = [[0; 3]; LARGEST_SIDE * LARGEST_SIDE];
+        for (place, mut bits) in tiles.iter() {
+            let mut sums = [[0; 3]; LARGEST_SIDE * LARGEST_SIDE];
+            let lights = atlas.lights().zip(self.lights.iter());
+            for (light, entry) in lights.filter(|(light, _)| light.code.is_tiled()) {
+                if bits.next_light(place, light.last, &mut block) {
+                    let terms = entry.full_terms(&light);
+                    for (sums, codes) in sums.iter_mut().zip(&block).take(place.len()) {
+                        for ((sum, (weight, values)), code) in
+                            sums.iter_mut().zip(&terms).zip(codes)
+                        {
+                            *sum += weight.of(values.of(*code));
+                        }
+                    }
+                }
+            }
+            keep_largest(&mut brightest, &sums);
+        }
+        brightest
+    }
+
+    /// Of the lights that are not in tiles.
+    fn brightest_of_rows(&self, atlas: &Atlas) -> [u32; 3] {
+        let stride = atlas
+            .lights()
+            .map(|light| light.code.bytes())
+            .sum::<usize>();
+        let Some(stride) = NonZeroUsize::new(stride) else {
+            return [0; 3];
+        };
+        let mut brightest = [0; 3];
+        for rows in atlas.codes().chunks(stride.get().saturating_mul(CHUNK)) {
+            let mut sums = [[0; 3]; CHUNK];
+            let mut rest = rows;
+            let lights = atlas.lights().zip(self.lights.iter());
+            for (light, entry) in lights.filter(|(light, _)| !light.code.is_tiled()) {
+                let terms = entry.full_terms(&light);
+                let mut codes = rest.chunks(stride.get());
+                for (sums, codes) in sums.iter_mut().zip(&mut codes) {
+                    let codes = match (light.code.bytes(), codes) {
+                        (3, [r, g, b, ..]) => [*r, *g, *b],
+                        (_, [luminance, ..]) => [*luminance; 3],
+                        _ => [0; 3],
+                    };
+                    for ((sum, (weight, values)), code) in sums.iter_mut().zip(&terms).zip(codes) {
+                        *sum += weight.of(values.of(code.into()));
+                    }
+                }
+                rest = rest.get(light.code.bytes()..).unwrap_or_default();
+            }
+            keep_largest(&mut brightest, &sums);
+        }
+        brightest
+    }
+
+    /// Sets the levels of a light: shares of its full weight, 2^-16 each; without such a light nothing happens.
+    pub fn set(&mut self, light: u32, levels: [u16; 3]) {
+        if let Some(entry) = self.lights.get_mut(light as usize) {
+            entry.levels = levels;
+        }
+    }
+
+    /// The levels of a light; `None` without such a light.
+    #[must_use]
+    pub fn levels(&self, light: u32) -> Option<[u16; 3]> {
+        Some(self.lights.get(light as usize)?.levels)
+    }
+
+    /// What the codes of a light contribute to sums of so many bits.
+    pub(super) fn terms(
+        &self,
+        atlas: &Atlas,
+        light: u32,
+        bits: [u32; 3],
+    ) -> Result<Terms, RelightError> {
+        let expected = atlas.light_count();
+        let entry = self.lights.get(light as usize);
+        let found = entry.zip(atlas.curves(light));
+        let (entry, (curves, last)) = found.ok_or(RelightError::Lights { expected })?;
+        Ok(entry.terms(curves, last, bits))
+    }
+}
+
+/// What the codes of a light contribute, by channel.
+pub type Terms = [(Weight, Values); 3];
+
+impl FrameLight {
+    fn terms(&self, curves: [Curve; 3], last: [u16; 3], bits: [u32; 3]) -> Terms {
+        let ([r, g, b], [last_r, last_g, last_b]) = (curves, last);
+        let ([gain_r, gain_g, gain_b], [level_r, level_g, level_b]) = (self.gains, self.levels);
+        let [bits_r, bits_g, bits_b] = bits;
+        [
+            (gain_r.weight(level_r, bits_r), Values::new(r, last_r)),
+            (gain_g.weight(level_g, bits_g), Values::new(g, last_g)),
+            (gain_b.weight(level_b, bits_b), Values::new(b, last_b)),
+        ]
+    }
+
+    /// At the full weight, in 2^-16 of the full scale.
+    fn full_terms(&self, light: &AtlasLight) -> Terms {
+        let full = Self {
+            levels: [u16::MAX; 3],
+            ..*self
+        };
+        full.terms(light.curves, light.last, [BITS as u32; 3])
+    }
+}
+
+fn keep_largest(largest: &mut [u32; 3], sums: &[[u32; 3]]) {
+    for sums in sums {
+        for (largest, sum) in largest.iter_mut().zip(sums) {
+            *largest = (*largest).max(*sum);
+        }
+    }
+}
+
+/// What 2^-`exponent` of a value is worth at full weight, W/m2.
+fn unit(full: f32, scale: Scale, values: &Values) -> Wide {
+    let scale = Wide::new(scale.mantissa().into(), scale.exponent().into());
+    Wide::from_float(full).times(scale).scaled(values.exponent)
+}
+
+/// Elements that follow each other and reflect alike.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
+pub struct Run {
+    /// How many.
+    pub elements: u32,
+    /// Their reflectance, in 2^-16; of a radiosity, which has it multiplied in, [`u16::MAX`].
+    pub reflectance: [u16; 3],
+}
+
+/// From sums to pixels: reflectances, exposure, and how a display encodes.
+#[derive(Debug)]
+pub struct Finish<'a, T> {
+    runs: &'a [Run],
+    gains: [Gain; 3],
+    pub(super) tone: &'a T,
+}
+
+impl<'a, T: Encode> Finish<'a, T> {
+    /// Shows radiance times `exposure`, 1 being white; `runs` are all elements in their order.
+    ///
+    /// # Errors
+    /// [`RelightError::Elements`]; [`RelightError::Range`] for an exposure that is not positive and finite, or under which an
+    /// element may show brighter than the last of the [`STEPS`]: take a table with a lower white.
+    pub fn new(
+        atlas: &Atlas,
+        mix: &FrameMix,
+        runs: &'a [Run],
+        exposure: f32,
+        tone: &'a T,
+    ) -> Result<Self, RelightError> {
+        let is_positive = (1..0x7f80_0000).contains(&exposure.to_bits());
+        let white = Wide::new(tone.white().into(), -(STEPS.ilog2() as i32));
+        let shown = Wide::from_float(exposure).times(Wide::from_float(FRAC_1_PI));
+        let gains = mix.full_scale.map(|scale| {
+            let gain = shown.times(white).times(scale);
+            Gain::new(gain)
+        });
+        let finish = Self { runs, gains, tone };
+        finish.check(atlas.element_count() as usize)?;
+        let fits = runs.iter().all(|run| finish.factors(run).is_some());
+        if is_positive && fits {
+            Ok(finish)
+        } else {
+            Err(RelightError::Range)
+        }
+    }
+
+    /// What multiplies the sums of a run, in 2^-16 steps of 2^-11 of the full scale; `None` beyond 16 bits.
+    fn factors(&self, run: &Run) -> Option<[u16; 3]> {
+        let ([r, g, b], [gain_r, gain_g, gain_b]) = (run.reflectance, self.gains);
+        let factor = |reflectance: u16, gain: Gain| {
+            let product = u32::from(gain.mantissa) * u32::from(reflectance);
+            // Between 0 and 31 for everything that fits and does not vanish.
+            match u32::try_from(-i32::from(gain.exponent)) {
+                Ok(shift @ 0..=31) => u16::try_from(product >> shift).ok(),
+                Ok(_) => Some(0),
+                Err(_) => (product == 0).then_some(0),
+            }
+        };
+        Some([factor(r, gain_r)?, factor(g, gain_g)?, factor(b, gain_b)?])
+    }
+
+    /// Whether the runs are so many elements.
+    pub(super) fn check(&self, elements: usize) -> Result<(), RelightError> {
+        let mut runs = self.runs.iter();
+        let left = runs.try_fold(elements, |left, run| {
+            left.checked_sub(run.elements as usize)
+        });
+        let expected = elements as u32;
+        match left {
+            Some(0) => Ok(()),
+            _ => Err(RelightError::Elements { expected }),
+        }
+    }
+
+    /// Calls `f` with the pixels of every run and what multiplies their sums.
+    #[inline(always)]
+    pub(super) fn by_run(
+        &self,
+        mut pixels: &mut [T::Pixel],
+        mut f: impl FnMut(&mut [T::Pixel], [u16; 3]),
+    ) -> Result<(), RelightError> {
+        self.check(pixels.len())?;
+        for run in self.runs {
+            let own = pixels.split_off_mut(..run.elements as usize);
+            let factors = self.factors(run).unwrap_or_default();
+            f(own.unwrap_or_default(), factors);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,463 @@
+//! The C library as a C programmer meets it: the header fits the source, and one program relights with the bits of the
+//! Rust kernels on the desktop, on a Cortex-M4F, on a Cortex-M0 and, in JavaScript, in WebAssembly.
+//!
+//! Whatever is not installed is a failure in CI (variable `CI`); elsewhere a test says what it did not run.
+
+#[expect(dead_code, reason = "other tests use the rest")]
+mod bake;
+#[expect(dead_code, reason = "the bare-metal images use the rest")]
+mod inputs;
+
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+use inputs::{Input, hash, inputs};
+use relume::atlas::Atlas;
+use relume::code::Code;
+use relume::relight::{
+    Colour, Finish, FixedMix, FixedWeight, Form, FrameLight, FrameMix, Lum, add_lights,
+    relight_fixed, show_sums,
+};
+use relume::tone::Rgb888Table;
+use relume_host::export::firmware::{Language, files};
+
+/// The light that is changed, as in the images of `tests/firmware`.
+const CHANGED: usize = 1;
+
+/// What is installed with one command of apt.
+const ARM: &str = "gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm";
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// A folder for what one test builds.
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join("c-library")
+        .join(name);
+    fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+/// The standard output of a command that has to end well.
+fn output(command: &mut Command) -> String {
+    let found = command
+        .output()
+        .unwrap_or_else(|error| panic!("{command:?}: {error}"));
+    let [out, err] = [&found.stdout, &found.stderr].map(|text| String::from_utf8_lossy(text));
+    assert!(found.status.success(), "{command:?}\n{out}{err}");
+    out.into_owned()
+}
+
+/// Whether these programs and the compiler's target are there; where not, the test fails in CI and says so elsewhere.
+fn is_installed(what: &str, programs: &[&str], target: &str, packages: &str) -> bool {
+    let is_there = |program: &&&str| {
+        let mut look = Command::new("sh");
+        look.args(["-c", &format!("command -v {program}")]);
+        look.output().is_ok_and(|found| found.status.success())
+    };
+    let mut missing: Vec<String> = programs
+        .iter()
+        .filter(|program| !is_there(program))
+        .map(ToString::to_string)
+        .collect();
+    let rustup = Command::new("rustup")
+        .args(["target", "list", "--installed"])
+        .output();
+    let has_target =
+        rustup.is_ok_and(|list| String::from_utf8_lossy(&list.stdout).contains(target));
+    if !has_target && !Path::new("/usr/lib/rustlib/src").exists() {
+        missing.push(format!("Rust for {target}"));
+    }
+    if missing.is_empty() || std::env::var_os("CI").is_some() {
+        assert!(
+            missing.is_empty(),
+            "{what} needs {}: {packages}",
+            missing.join(", ")
+        );
+        return true;
+    }
+    // Not by a macro, whose output a passing test would swallow.
+    let missing = missing.join(", ");
+    let _ = writeln!(
+        std::io::stderr(),
+        "NOT RUN: {what}, for lack of {missing}; `rustup target add {target}` and {packages}"
+    );
+    false
+}
+
+/// Builds the library for a target and returns its folder.
+fn library(target: &str) -> PathBuf {
+    let mut build = Command::new("bash");
+    let cargo = "cargo build --profile device --locked -p relume-ffi";
+    let script = match target {
+        "" => cargo.to_owned(),
+        _ => format!("source .ci/bare-metal.sh {target} && {cargo} --target {target}"),
+    };
+    let built = folder("library");
+    build.current_dir(root()).env("CARGO_TARGET_DIR", &built);
+    output(build.args(["-c", &script]));
+    built.join(target).join("device")
+}
+
+/// The hash of bytes as [`hash`] makes it of pairs of them; their number is even.
+fn hash_bytes(bytes: &[u8]) -> u32 {
+    let pairs = bytes.as_chunks().0.iter();
+    hash(
+        &pairs
+            .map(|pair| u16::from_le_bytes(*pair))
+            .collect::<Vec<u16>>(),
+    )
+}
+
+/// An input, and what a program has to say of it.
+struct Case {
+    input: Input,
+    expected: Vec<(&'static str, u32)>,
+    /// The same of what a small board has no memory for.
+    large: Vec<(&'static str, u32)>,
+}
+
+/// The inputs of the bare-metal images whose codes frames read.
+fn cases() -> &'static [Case] {
+    static CASES: OnceLock<Vec<Case>> = OnceLock::new();
+    CASES.get_or_init(|| {
+        let inputs = inputs().into_iter();
+        inputs
+            .filter(|input| !input.name.starts_with("tiles"))
+            .map(Case::new)
+            .collect()
+    })
+}
+
+/// Three bytes for every element.
+fn bytes_of<F: Form>(input: &Input, mut table: F::Table<1>) -> Vec<u8> {
+    let atlas = Atlas::parse(&input.atlas).unwrap();
+    let mut room = vec![FrameLight::EMPTY; input.full.len()];
+    let mut mix = FrameMix::new(&atlas, &input.full, &mut room).unwrap();
+    for (light, levels) in (0..).zip(&input.levels[1]) {
+        mix.set(light, *levels);
+    }
+    let tone = Rgb888Table::new(1024);
+    let finish = Finish::new(&atlas, &mix, &input.runs, input.exposure, &tone).unwrap();
+    let mut sums = vec![F::Sum::default(); atlas.element_count() as usize];
+    add_lights::<F>(&atlas, &mix, &mut table, &mut sums).unwrap();
+    let mut pixels = vec![[0; 3]; sums.len()];
+    show_sums::<F, _>(&atlas, &sums, &finish, &mut pixels).unwrap();
+    pixels.into_flattened()
+}
+
+impl Case {
+    fn new(input: Input) -> Self {
+        let [first, second] = &input.levels;
+        let mut changed = first.clone();
+        changed[CHANGED] = second[CHANGED];
+        let frame = |levels: &[[u16; 3]]| hash(&input.in_integers(levels));
+        let bytes = if input.name.starts_with("lum") {
+            bytes_of::<Lum>(&input, [[0]; 256])
+        } else {
+            bytes_of::<Colour>(&input, [[[0]; 256]; 3])
+        };
+        let expected = vec![
+            ("full_565", frame(second)),
+            ("change_565", frame(&changed)),
+            ("undone_565", frame(first)),
+        ];
+
+        let atlas = Atlas::parse(&input.atlas).unwrap();
+        let mut weights = vec![FixedWeight::EMPTY; input.full.len()];
+        let fixed = FixedMix::new(&atlas, &input.full, &input.full, &mut weights).unwrap();
+        let mut sums = vec![[0; 3]; atlas.element_count() as usize];
+        relight_fixed(&atlas, &fixed, &mut sums).unwrap();
+        let sums = sums.as_flattened().iter().flat_map(|sum| sum.to_le_bytes());
+        let sums: Vec<u8> = sums.collect();
+        let large = vec![
+            ("full_888", hash_bytes(&bytes)),
+            ("irradiance", hash_bytes(&sums)),
+            ("unit", hash_bytes(&fixed.unit().to_le_bytes())),
+        ];
+        Self {
+            input,
+            expected,
+            large,
+        }
+    }
+
+    /// Writes what `relight.c` includes: the atlas as `relume export --c` does, and numbers.
+    fn write_scene(&self, folder: &Path) {
+        let Input {
+            atlas: bytes,
+            runs,
+            levels,
+            exposure,
+            ..
+        } = &self.input;
+        let atlas = Atlas::parse(bytes).unwrap();
+        for (name, text) in files(&atlas, bytes, "room", Language::C) {
+            fs::write(folder.join(name), text).unwrap();
+        }
+        let triple = |[r, g, b]: [u16; 3]| format!("{{{r}, {g}, {b}}}");
+        let list = |items: Vec<String>| format!("{{{}}}", items.join(", "));
+        let run = |run: &relume::relight::Run| {
+            format!("{{{}, {}}}", run.elements, triple(run.reflectance))
+        };
+        let runs = list(runs.iter().map(run).collect());
+        let [first, second] = levels
+            .each_ref()
+            .map(|all| list(all.iter().copied().map(triple).collect()));
+        let (elements, lights) = (atlas.element_count(), atlas.light_count());
+        let is_lum = atlas.lights().all(|light| light.code == Code::Lum8);
+        let memory = if is_lum {
+            1024 + 4 * elements
+        } else {
+            1536 + 6 * elements
+        } + 20 * lights;
+        let text = format!(
+            "#define ELEMENTS {elements}u\n#define LIGHTS {lights}u\n#define CHANGED {CHANGED}u\n\
+             #define FRAME_MEMORY {memory}u\n#define EXPOSURE {exposure:e}f\n\
+             static const RelumeRun runs[] = {runs};\n\
+             static const RelumeLevels first[LIGHTS] = {first};\n\
+             static const RelumeLevels second[LIGHTS] = {second};\n"
+        );
+        fs::write(folder.join("scene.h"), text).unwrap();
+    }
+
+    /// Compares what a program said, `name number` on each line; names of other things are let be.
+    fn check(&self, said: &str, with_large: bool) {
+        let large = self.large.iter().filter(|_| with_large);
+        for (name, expected) in self.expected.iter().chain(large) {
+            let mut lines = said.lines().filter_map(|line| line.split_once(' '));
+            let found = lines
+                .find(|(found, _)| found == name)
+                .map(|(_, value)| value.trim());
+            assert_eq!(
+                found,
+                Some(&*expected.to_string()),
+                "{} {name}:\n{said}",
+                self.input.name
+            );
+        }
+    }
+}
+
+#[test]
+fn the_header_is_made_from_the_source() {
+    let source = root().join("solver/ffi");
+    let config = cbindgen::Config::from_file(source.join("cbindgen.toml")).unwrap();
+    let mut builder = cbindgen::Builder::new().with_config(config);
+    for name in ["status", "atlas", "frame", "irradiance"] {
+        builder = builder.with_src(source.join(format!("src/{name}.rs")));
+    }
+    let mut header = Vec::new();
+    builder.generate().unwrap().write(&mut header);
+    let header = String::from_utf8(header).unwrap();
+    let path = source.join("relume.h");
+    if std::env::var_os("RELUME_BLESS").is_some() {
+        fs::write(&path, &header).unwrap();
+    }
+    let found = fs::read_to_string(&path).unwrap_or_default();
+    assert!(
+        found == header,
+        "{}: run this test with RELUME_BLESS=1",
+        path.display()
+    );
+}
+
+#[test]
+fn a_c_program_relights_on_the_desktop() {
+    let library = library("").join("librelume_c.a");
+    for case in cases() {
+        let folder = folder(&format!("desktop-{}", case.input.name));
+        case.write_scene(&folder);
+        let program = folder.join("relight");
+        let mut compile = Command::new("cc");
+        compile.args([
+            "-std=c11",
+            "-Wall",
+            "-Wextra",
+            "-Wpedantic",
+            "-Werror",
+            "-O2",
+        ]);
+        compile
+            .arg("-I")
+            .arg(&folder)
+            .arg("-I")
+            .arg(root().join("solver/ffi"));
+        for source in ["relight.c", "desktop.c"] {
+            compile.arg(root().join("tests/c_library").join(source));
+        }
+        compile
+            .arg(folder.join("room.c"))
+            .arg(&library)
+            .arg("-o")
+            .arg(&program);
+        output(compile.args(["-lpthread", "-ldl", "-lm"]));
+        case.check(&output(&mut Command::new(program)), true);
+    }
+}
+
+/// A board that QEMU emulates.
+struct Board {
+    target: &'static str,
+    compiler: &'static [&'static str],
+    emulator: &'static [&'static str],
+    flash: &'static str,
+    ram: &'static str,
+}
+
+const M4F: Board = Board {
+    target: "thumbv7em-none-eabihf",
+    compiler: &["-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"],
+    emulator: &["-M", "mps2-an386", "-cpu", "cortex-m4"],
+    flash: "4M",
+    ram: "4M",
+};
+
+const M0: Board = Board {
+    target: "thumbv6m-none-eabi",
+    compiler: &["-mcpu=cortex-m0", "-DSMALL"],
+    emulator: &["-M", "microbit"],
+    flash: "256K",
+    ram: "16K",
+};
+
+impl Board {
+    fn run(&self, what: &str) {
+        let programs = ["arm-none-eabi-gcc", "arm-none-eabi-nm", "qemu-system-arm"];
+        let packages = format!("`apt-get install {ARM}`");
+        if !is_installed(what, &programs, self.target, &packages) {
+            return;
+        }
+        let library = library(self.target).join("librelume_c.a");
+        for case in cases() {
+            let folder = folder(&format!("{}-{}", self.target, case.input.name));
+            case.write_scene(&folder);
+            let program = self.compile(&folder, &library);
+            let names = output(Command::new("arm-none-eabi-nm").arg(&program));
+            assert!(
+                !names.contains("panic"),
+                "a path to a panic is left:\n{names}"
+            );
+            let mut emulator = Command::new("timeout");
+            emulator.args(["60", "qemu-system-arm"]).args(self.emulator);
+            emulator.args([
+                "-icount",
+                "shift=10",
+                "-nographic",
+                "-monitor",
+                "none",
+                "-serial",
+                "none",
+            ]);
+            emulator.args(["-semihosting-config", "enable=on,target=native", "-kernel"]);
+            // Semihosting writes to standard error.
+            let found = emulator.arg(&program).output().unwrap();
+            let said = [found.stdout, found.stderr].concat();
+            let said = String::from_utf8_lossy(&said);
+            assert!(
+                found.status.success(),
+                "{} {}: {said}",
+                self.target,
+                case.input.name
+            );
+            case.check(&said, !self.compiler.contains(&"-DSMALL"));
+            println!("{} {}\n{said}", self.target, case.input.name);
+        }
+    }
+
+    fn compile(&self, folder: &Path, library: &Path) -> PathBuf {
+        let sources = root().join("tests/c_library");
+        let program = folder.join("relight.elf");
+        let mut compile = Command::new("arm-none-eabi-gcc");
+        compile.args(self.compiler);
+        compile.args([
+            "-mthumb",
+            "-std=gnu11",
+            "-Wall",
+            "-Wextra",
+            "-Werror",
+            "-Os",
+        ]);
+        compile.args([
+            "-ffunction-sections",
+            "-fdata-sections",
+            "-nostartfiles",
+            "--specs=nano.specs",
+        ]);
+        compile
+            .arg("-I")
+            .arg(folder)
+            .arg("-I")
+            .arg(root().join("solver/ffi"));
+        compile
+            .arg(sources.join("relight.c"))
+            .arg(sources.join("startup.c"));
+        compile.arg(folder.join("room.c")).arg(library);
+        compile
+            .arg("-T")
+            .arg(sources.join("link.ld"))
+            .arg("-Wl,--gc-sections,--build-id=none");
+        for (name, size) in [("flash", self.flash), ("ram", self.ram)] {
+            let size = size.strip_suffix('K').map_or(4 << 20, |kilobytes| {
+                1024 * kilobytes.parse::<u32>().unwrap()
+            });
+            compile.arg(format!("-Wl,--defsym={name}_size={size}"));
+        }
+        output(compile.arg("-o").arg(&program));
+        println!(
+            "{}",
+            output(Command::new("arm-none-eabi-size").arg(&program))
+        );
+        program
+    }
+}
+
+#[test]
+fn a_c_program_relights_on_a_cortex_m4f() {
+    M4F.run("the C program on an emulated Cortex-M4F");
+}
+
+#[test]
+fn a_c_program_relights_on_a_cortex_m0() {
+    M0.run("the C program on an emulated Cortex-M0");
+}
+
+#[test]
+fn javascript_relights_by_web_assembly() {
+    let target = "wasm32-unknown-unknown";
+    let packages = "`apt-get install nodejs`";
+    if !is_installed("the library in WebAssembly", &["node"], target, packages) {
+        return;
+    }
+    let library = library(target).join("relume_c.wasm");
+    for case in cases() {
+        let Input {
+            name,
+            atlas,
+            runs,
+            full,
+            levels,
+            exposure,
+        } = &case.input;
+        let folder = folder(&format!("wasm-{name}"));
+        let [bytes, scene] = ["room.atlas", "scene.json"].map(|name| folder.join(name));
+        fs::write(&bytes, atlas).unwrap();
+        let numbers = serde_json::json!({
+            "full": full.iter().map(|full| full.to_array()).collect::<Vec<_>>(),
+            "levels": levels,
+            "runs": runs.iter().map(|run| (run.elements, run.reflectance)).collect::<Vec<_>>(),
+            "exposure": exposure,
+            "changed": CHANGED,
+        });
+        fs::write(&scene, numbers.to_string()).unwrap();
+        let mut node = Command::new("node");
+        node.arg(root().join("tests/c_library/relight.mjs"));
+        case.check(&output(node.args([&library, &bytes, &scene])), true);
+    }
+    println!("{target}: {} bytes", fs::metadata(library).unwrap().len());
+}

@@ -1,0 +1,362 @@
+//! The solver on microcontrollers, in an emulator: the same pixels as here, in so many instructions.
+
+mod inputs;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::{env, fs, iter};
+
+use inputs::{Input, hash, inputs, write_if_new};
+use relume::atlas::Atlas;
+use relume_host::device_cost::{Core, DeviceCost};
+use serde_json::{Value, json};
+
+/// The images of `tests/firmware`: the binary, its kernel, its input.
+const IMAGES: [(&str, &str, &str); 7] = [
+    ("full_lum_960", "full_lum_565", "lum_960x8"),
+    ("full_lum_1920", "full_lum_565", "lum_1920x30"),
+    ("batches_lum_1920", "full_lum_565", "lum_1920x30"),
+    ("full_rgb_960", "full_rgb_565", "rgb_960x8"),
+    ("change_lum_960", "change_lum_565", "lum_960x8"),
+    ("change_rgb_960", "change_rgb_565", "rgb_960x8"),
+    ("full_tiles_960", "full_tiles_565", "tiles_960x8"),
+];
+
+/// Cortex-M0, M3 and M4F.
+const TARGETS: [&str; 3] = [
+    "thumbv6m-none-eabi",
+    "thumbv7m-none-eabi",
+    "thumbv7em-none-eabihf",
+];
+
+/// The one without hardware for floats.
+const SMALL: &str = TARGETS[0];
+
+/// The light that the `change` images change.
+const CHANGED: usize = 1;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn work() -> PathBuf {
+    root().join("target/firmware")
+}
+
+/// Whether all tools are there; else says what to install, and fails on a build server.
+fn has_tools() -> bool {
+    let works = |program: &str| Command::new(program).arg("--version").output().is_ok();
+    let missing: Vec<&str> = ["qemu-system-arm", "arm-none-eabi-size", "arm-none-eabi-nm"]
+        .into_iter()
+        .filter(|program| !works(program))
+        .collect();
+    let script = Command::new("bash")
+        .args(["-c", "source .ci/bare-metal.sh thumbv6m-none-eabi --check"])
+        .current_dir(root())
+        .status();
+    if missing.is_empty() && script.is_ok_and(|status| status.success()) {
+        return true;
+    }
+    let told = format!(
+        "no firmware was built or run; missing: {missing:?} or a compiler for it. Install all with: bash .ci/bare-metal.sh all"
+    );
+    assert!(env::var_os("CI").is_none(), "{told}");
+    eprintln!("\nSKIPPED: {told}\n");
+    false
+}
+
+/// The triple of this machine.
+fn host() -> String {
+    let output = Command::new("rustc")
+        .arg("-vV")
+        .output()
+        .expect("a compiler");
+    let text = String::from_utf8(output.stdout).expect("plain text");
+    let host = text.lines().find_map(|line| line.strip_prefix("host: "));
+    host.expect("it says").to_owned()
+}
+
+/// The images of a target: the micro:bit has no room for tiles or for all tables, the others need no batches.
+fn images(target: &str) -> Vec<(&'static str, &'static str, &'static str)> {
+    let others: &[&str] = if target == SMALL {
+        &["full_lum_1920", "full_tiles_960"]
+    } else {
+        &["batches_lum_1920"]
+    };
+    let images = IMAGES.into_iter();
+    images.filter(|image| !others.contains(&image.0)).collect()
+}
+
+/// Builds images for a target.
+fn build(target: &str, images: &[&str], options: &str) -> Output {
+    let bins = images.join(" --bin ");
+    let script = format!(
+        "source .ci/bare-metal.sh {target} && cd tests/firmware && \
+         cargo build --release --locked --target {target} --bin {bins} {options}"
+    );
+    Command::new("bash")
+        .args(["-c", &script])
+        .current_dir(root())
+        .env("CARGO_TARGET_DIR", work().join("target"))
+        .env("FIRMWARE_DATA", work().join("data"))
+        // Those of the cargo that runs this test.
+        .env_remove("CARGO")
+        .env_remove("RUSTC")
+        .env_remove("RUSTFLAGS")
+        .output()
+        .expect("bash")
+}
+
+fn image(target: &str, name: &str) -> PathBuf {
+    work()
+        .join("target")
+        .join(target)
+        .join("release")
+        .join(name)
+}
+
+/// Starts an image in the emulator of its target: exit status and what it said.
+fn emulate(target: &str, name: &str) -> (Option<i32>, String) {
+    let config = fs::read_to_string(root().join("tests/firmware/.cargo/config.toml"));
+    let config = config.expect("it is checked in");
+    let (_, own) = config
+        .split_once(&format!("[target.{target}]"))
+        .expect("a runner");
+    let runner = own.split('"').nth(1).expect("in quotes");
+    let output = Command::new("timeout")
+        .arg("120")
+        .args(runner.split(' '))
+        .arg(image(target, name))
+        .output()
+        .expect("the emulator");
+    let said = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+    (output.status.code(), said.into_owned())
+}
+
+/// A number that an image said.
+fn said(text: &str, name: &str) -> Option<u32> {
+    let line = text
+        .lines()
+        .find_map(|line| line.strip_prefix(&format!("{name} 0x")));
+    u32::from_str_radix(line?.trim(), 16).ok()
+}
+
+/// Bytes of flash and of static RAM.
+fn size(image: &Path) -> [u64; 2] {
+    let output = Command::new("arm-none-eabi-size")
+        .args(["-A"])
+        .arg(image)
+        .output();
+    let text = String::from_utf8(output.expect("binutils").stdout).expect("plain text");
+    let of = |section: &str| {
+        let line = text
+            .lines()
+            .find(|line| line.split_whitespace().next() == Some(section));
+        let bytes = line.and_then(|line| line.split_whitespace().nth(1)?.parse().ok());
+        bytes.unwrap_or(0_u64)
+    };
+    let flash = of(".vector_table") + of(".text") + of(".rodata") + of(".data");
+    [flash, of(".data") + of(".bss") + of(".uninit")]
+}
+
+/// The row of one image on one target.
+fn row(target: &str, (name, kernel, _): (&str, &str, &str), input: &Input) -> Value {
+    let (status, text) = emulate(target, name);
+    assert_eq!(status, Some(0), "{target} {name}: {text}");
+    let number = |name| said(&text, name).unwrap_or_else(|| panic!("{target} {name}: {text}"));
+    let (n, k) = (
+        input.in_floats(&input.levels[0]).len() as u32,
+        input.full.len() as u32,
+    );
+    let (per_frame, warm) = (number("per_frame"), number("per_frame_warm"));
+    let is_change = kernel.starts_with("change");
+    let share = if is_change { n } else { n * k };
+    let [flash, statics] = size(&image(target, name));
+    let stack = number("stack");
+    json!({
+        "target": target,
+        "kernel": kernel,
+        "image": name,
+        "n": n,
+        "k": k,
+        "per_element_light": f64::from(warm) / f64::from(share),
+        "per_frame": per_frame,
+        "per_frame_warm": warm,
+        "flash": flash,
+        "ram": statics + u64::from(stack),
+        "stack": stack,
+        "hash": format!("{:08x}", number("hash")),
+    })
+}
+
+/// Pixels that differ from the `f32` ones by so many steps of RGB565.
+fn steps_apart(found: &[u16], expected: &[u16]) -> u16 {
+    let channels = |p: u16| [p >> 11, p >> 5 & 63, p & 31];
+    let pairs = found.iter().zip(expected);
+    let apart = pairs.flat_map(|(a, b)| {
+        let pairs = channels(*a).into_iter().zip(channels(*b));
+        pairs.map(|(a, b)| a.abs_diff(b))
+    });
+    apart.max().unwrap_or(0)
+}
+
+/// The mix that an image shows at its end.
+fn shown_mix(kernel: &str, input: &Input) -> Vec<[u16; 3]> {
+    let [first, second] = &input.levels;
+    if !kernel.starts_with("change") {
+        return second.clone();
+    }
+    let mut mix = first.clone();
+    mix[CHANGED] = second[CHANGED];
+    mix
+}
+
+#[test]
+fn every_frame_is_within_a_step_of_the_float_one() {
+    for input in inputs() {
+        for levels in &input.levels {
+            let apart = steps_apart(&input.in_integers(levels), &input.in_floats(levels));
+            assert!(apart <= 1, "{}: {apart} steps", input.name);
+        }
+    }
+}
+
+#[test]
+fn images_give_the_pixels_of_the_host_within_their_budgets() {
+    if !has_tools() {
+        return;
+    }
+    let inputs = inputs();
+    let data = work().join("data");
+    fs::create_dir_all(&data).expect("a folder that can be written to");
+    for input in &inputs {
+        input.write(&data);
+    }
+    let host = host();
+    let mut rows = Vec::new();
+    for (_, kernel, name) in IMAGES {
+        let input = inputs
+            .iter()
+            .find(|input| input.name == name)
+            .expect("an input");
+        let pixels = input.in_integers(&shown_mix(kernel, input));
+        rows.push(json!({
+            "target": host, "kernel": kernel, "n": pixels.len(), "k": input.full.len(),
+            "hash": format!("{:08x}", hash(&pixels)),
+        }));
+    }
+    for target in TARGETS {
+        let images = images(target);
+        let names: Vec<&str> = images.iter().map(|image| image.0).collect();
+        let built = build(target, &names, "");
+        let told = String::from_utf8_lossy(&built.stderr);
+        assert!(built.status.success(), "{target}: {told}");
+        for image in images {
+            let input = inputs.iter().find(|input| input.name == image.2);
+            rows.push(row(target, image, input.expect("an input")));
+        }
+    }
+    let text = format!("{:#}\n", json!({"rows": rows}));
+    write_if_new(&work().join("rows.json"), text.as_bytes());
+    let shape = |row: &Value| ["kernel", "n", "k"].map(|key| row[key].to_string());
+    for row in &rows {
+        for other in rows.iter().filter(|other| shape(other) == shape(row)) {
+            assert_eq!(row["hash"], other["hash"], "{row} {other}");
+        }
+    }
+    check_budgets(&rows);
+    check_predictions(&rows, &inputs);
+    no_float_on_the_small_core();
+    one_index_does_not_link();
+}
+
+/// What may be used is what was used when the budgets were written, and 1 %.
+fn check_budgets(rows: &[Value]) {
+    let path = root().join("tests/firmware/budgets.json");
+    let keys = ["per_frame", "per_frame_warm", "flash", "ram"];
+    let images = rows.iter().filter(|row| !row["image"].is_null());
+    let key = |row: &Value| format!("{} {}", row["target"], row["image"]).replace('"', "");
+    if env::var_os("RELUME_WRITE_BUDGETS").is_some() {
+        let used = images.map(|row| (key(row), json!(keys.map(|key| row[key].clone()))));
+        let used: serde_json::Map<String, Value> = used.collect();
+        fs::write(path, format!("{:#}\n", Value::from(used))).expect("our own tree");
+        return;
+    }
+    let budgets = fs::read_to_string(path).expect("they are checked in");
+    let budgets: Value = serde_json::from_str(&budgets).expect("plain JSON");
+    let mut exceeded = Vec::new();
+    for row in images {
+        for (place, name) in keys.iter().enumerate() {
+            let used = row[*name].as_f64().expect("a number");
+            let budget = budgets[key(row)][place].as_f64().unwrap_or(0.0);
+            if used > 1.01 * budget {
+                exceeded.push(format!("{} {name}: {used}, budget {budget}", key(row)));
+            }
+        }
+    }
+    assert!(exceeded.is_empty(), "{}", exceeded.join("\n"));
+}
+
+/// What `relume info` predicts of frames is within 10 % of what was counted.
+fn check_predictions(rows: &[Value], inputs: &[Input]) {
+    let cores = iter::zip(TARGETS, Core::ALL);
+    for row in rows {
+        let core = cores.clone().find(|(target, _)| row["target"] == *target);
+        let image = IMAGES.iter().find(|image| row["image"] == image.0);
+        let (Some((_, core)), Some((image, kernel, name))) = (core, image) else {
+            continue;
+        };
+        if kernel.starts_with("change") {
+            continue;
+        }
+        let input = inputs.iter().find(|input| input.name == *name);
+        let bytes = &input.expect("an input").atlas;
+        let atlas = Atlas::parse(bytes).expect("an atlas");
+        let cost = DeviceCost::new(&atlas, bytes.len(), core);
+        for (predicted, key) in [
+            (cost.flash, "flash"),
+            (cost.ram, "ram"),
+            (cost.frame, "per_frame_warm"),
+        ] {
+            let counted = row[key].as_f64().expect("a number");
+            let off = (predicted as f64 / counted - 1.0).abs();
+            assert!(
+                off <= 0.1,
+                "{image}, {core:?}, {key}: {predicted} for {counted}"
+            );
+        }
+    }
+}
+
+/// Names of soft-float routines: `__aeabi_fadd`, `__mulsf3`, `__floatsidf` and so on.
+fn is_soft_float(symbol: &str) -> bool {
+    let aeabi = symbol.strip_prefix("__aeabi_").unwrap_or("");
+    let starts = [
+        "fadd", "fsub", "frsub", "fmul", "fdiv", "fcmp", "f2", "i2f", "ui2f", "l2f", "ul2f",
+        "dadd", "dsub", "dmul", "ddiv", "dcmp", "d2", "i2d", "ui2d", "l2d", "ul2d",
+    ];
+    let is_gnu = symbol.starts_with("__") && (symbol.contains("sf") || symbol.contains("df"));
+    is_gnu || starts.iter().any(|start| aeabi.starts_with(start))
+}
+
+fn no_float_on_the_small_core() {
+    assert!(is_soft_float("__aeabi_fmul") && is_soft_float("__mulsf3"));
+    for (name, ..) in images(SMALL) {
+        let image = image(SMALL, name);
+        let output = Command::new("arm-none-eabi-nm").arg(image).output();
+        let text = String::from_utf8(output.expect("binutils").stdout).expect("plain text");
+        let symbols = text.lines().filter_map(|line| line.split(' ').next_back());
+        assert!(symbols.clone().count() > 10, "{name} has symbols");
+        let floats: Vec<&str> = symbols.filter(|symbol| is_soft_float(symbol)).collect();
+        assert!(floats.is_empty(), "{name}: {floats:?}");
+    }
+}
+
+/// The panic handler calls what does not exist: images link because they cannot panic.
+fn one_index_does_not_link() {
+    let output = build(SMALL, &["change_lum_960"], "--features one-index");
+    let told = String::from_utf8_lossy(&output.stderr);
+    let links = output.status.success();
+    assert!(!links, "an index that may be out of range links");
+    assert!(told.contains("a_panic_path_is_left"), "{told}");
+}

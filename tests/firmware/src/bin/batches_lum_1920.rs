@@ -1,0 +1,21 @@
+//! `full_lum_565` of 1920 elements and 30 lights.
+
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::entry;
+use firmware::Lent;
+use firmware::kernels::{Input, run_sums};
+use relume::relight::Lum;
+
+include!(concat!(env!("FIRMWARE_DATA"), "/lum_1920x30.rs"));
+
+static SUMS: Lent<[u32; 1920]> = Lent::new([0; 1920]);
+static TABLE: Lent<[[u32; 1]; 256]> = Lent::new([[0; 1]; 256]);
+static PIXELS: Lent<[u16; 1920]> = Lent::new([0; 1920]);
+
+#[entry]
+fn main() -> ! {
+    // SAFETY: once.
+    unsafe { run_sums::<Lum, 30>(&INPUT, SUMS.lend(), TABLE.lend(), PIXELS.lend()) }
+}

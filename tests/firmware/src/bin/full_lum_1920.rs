@@ -1,0 +1,20 @@
+//! `full_lum_565` of 1920 elements and 30 lights.
+
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::entry;
+use firmware::Lent;
+use firmware::kernels::{Input, run_full};
+use relume::relight::Lum;
+
+include!(concat!(env!("FIRMWARE_DATA"), "/lum_1920x30.rs"));
+
+static TABLE: Lent<[[u32; 32]; 256]> = Lent::new([[0; 32]; 256]);
+static PIXELS: Lent<[u16; 1920]> = Lent::new([0; 1920]);
+
+#[entry]
+fn main() -> ! {
+    // SAFETY: once.
+    unsafe { run_full::<Lum, 30, 32>(&INPUT, TABLE.lend(), PIXELS.lend()) }
+}

@@ -1,0 +1,200 @@
+//! What the images do: one kernel each, from its atlas to the hash of its pixels.
+
+use core::hint::black_box;
+
+use relume::atlas::Atlas;
+use relume::color::Rgb;
+use relume::relight::{
+    AnyTable, Finish, Form, FrameLight, FrameMix, Run, Sums, fill_table, full, full_any,
+};
+use relume::tone::Rgb565Table;
+
+use crate::{count, exit, hash, largest_stack, paint_stack, say};
+
+/// White at half of the steps: twice as bright is still told apart from more.
+static TONE: Rgb565Table = Rgb565Table::new(1024);
+
+/// An atlas of `K` lights and what is to be made of it.
+pub struct Input<const K: usize> {
+    /// Its bytes.
+    pub atlas: &'static [u8],
+    /// The largest weight of every light.
+    pub full: [Rgb; K],
+    /// Two mixes, in levels.
+    pub levels: [[[u16; 3]; K]; 2],
+    /// Reflectances.
+    pub runs: &'static [Run],
+    /// Radiance times this is 1 at white.
+    pub exposure: f32,
+}
+
+/// The light that changes where one does.
+const CHANGED: u32 = 1;
+
+/// A result, or the end.
+fn must<T, E>(result: Result<T, E>) -> T {
+    match result {
+        Ok(value) => value,
+        Err(_) => exit(1),
+    }
+}
+
+/// The end, unless both are the same.
+fn same(a: u32, b: u32) {
+    if a != b {
+        exit(1);
+    }
+}
+
+/// Levels that the compiler does not know.
+fn volatile<const K: usize>(levels: &[[u16; 3]; K]) -> [[u16; 3]; K] {
+    // SAFETY: a reference to a plain value.
+    unsafe { core::ptr::read_volatile(levels) }
+}
+
+fn set_all<const K: usize>(mix: &mut FrameMix, levels: &[[u16; 3]; K]) {
+    for (light, levels) in (0..).zip(levels) {
+        mix.set(light, *levels);
+    }
+}
+
+/// With the feature `one-index` a panic path, which no image may have.
+fn one_index(pixels: &[u16], at: u32) {
+    #[cfg(feature = "one-index")]
+    black_box(pixels[black_box(at) as usize]);
+    #[cfg(not(feature = "one-index"))]
+    let _ = (pixels, at);
+}
+
+fn report(per_frame: u32, warm: u32, hash: u32) -> ! {
+    say(c"per_frame", per_frame);
+    say(c"per_frame_warm", warm);
+    say(c"hash", hash);
+    say(c"stack", largest_stack());
+    exit(0)
+}
+
+/// Frames from the tables of all lights.
+pub fn run_full<F: Form, const K: usize, const L: usize>(
+    input: &'static Input<K>,
+    table: &'static mut F::Table<L>,
+    pixels: &'static mut [u16],
+) -> ! {
+    paint_stack();
+    let [first, second] = input.levels.each_ref().map(volatile);
+    let atlas = must(Atlas::parse_codes(input.atlas));
+    let mut room = [FrameLight::EMPTY; K];
+    let mut mix = must(FrameMix::new(&atlas, &input.full, &mut room));
+    let finish = must(Finish::new(&atlas, &mix, input.runs, input.exposure, &TONE));
+    let mut frame = |levels: &[[u16; 3]; K], table: &mut F::Table<L>, pixels: &mut [u16]| {
+        set_all(&mut mix, levels);
+        for light in 0..K as u32 {
+            must(fill_table::<F, L>(&atlas, &mix, light, table));
+        }
+        must(full::<F, K, L, _>(
+            &atlas,
+            black_box(table),
+            &finish,
+            pixels,
+        ));
+    };
+    frame(&first, table, pixels);
+    let cold = count(|| frame(&second, table, pixels));
+    let cold_hash = hash(pixels);
+    pixels.fill(0);
+    let warm = count(|| {
+        must(full::<F, K, L, _>(
+            &atlas,
+            black_box(table),
+            &finish,
+            pixels,
+        ))
+    });
+    same(cold_hash, hash(pixels));
+    report(cold, warm, cold_hash)
+}
+
+/// Frames whose tables do not fit into memory together.
+pub fn run_sums<F: Form, const K: usize>(
+    input: &'static Input<K>,
+    sums: &'static mut [F::Sum],
+    table: &'static mut F::Table<1>,
+    pixels: &'static mut [u16],
+) -> ! {
+    paint_stack();
+    let [_, second] = input.levels.each_ref().map(volatile);
+    let atlas = must(Atlas::parse_codes(input.atlas));
+    let mut room = [FrameLight::EMPTY; K];
+    let mut mix = must(FrameMix::new(&atlas, &input.full, &mut room));
+    let finish = must(Finish::new(&atlas, &mix, input.runs, input.exposure, &TONE));
+    let cold = count(|| {
+        set_all(&mut mix, &second);
+        let sums = must(Sums::<F>::new::<K>(&atlas, &mix, sums, table));
+        must(sums.show(&finish, pixels));
+    });
+    report(cold, cold, hash(pixels))
+}
+
+/// One changed light, and back.
+pub fn run_change<F: Form, const K: usize>(
+    input: &'static Input<K>,
+    sums: &'static mut [F::Sum],
+    table: &'static mut F::Table<1>,
+    pixels: &'static mut [u16],
+) -> ! {
+    paint_stack();
+    let [first, second] = input.levels.each_ref().map(volatile);
+    let light = CHANGED as usize;
+    let (Some(before), Some(after)) = (first.get(light), second.get(light)) else {
+        exit(1)
+    };
+    let atlas = must(Atlas::parse_codes(input.atlas));
+    let mut room = [FrameLight::EMPTY; K];
+    let mut mix = must(FrameMix::new(&atlas, &input.full, &mut room));
+    let finish = must(Finish::new(&atlas, &mix, input.runs, input.exposure, &TONE));
+    set_all(&mut mix, &first);
+    let mut kept = must(Sums::<F>::new::<K>(&atlas, &mix, sums, table));
+    must(kept.show(&finish, pixels));
+    let unchanged = hash(pixels);
+    let cold = count(|| {
+        must(kept.change::<K, _>(&atlas, &mut mix, (CHANGED, *after), &finish, pixels));
+    });
+    let changed = hash(pixels);
+    one_index(pixels, changed);
+    // What is left when the table is there already.
+    let table = count(|| {
+        must(kept.set(&atlas, &mut mix, (CHANGED, *before)));
+    });
+    must(kept.apply::<K, _>(&atlas, CHANGED, &finish, pixels));
+    same(unchanged, hash(pixels));
+    report(cold, cold - table, changed)
+}
+
+/// Frames from codes of any kind.
+pub fn run_any<const K: usize>(
+    input: &'static Input<K>,
+    values: &'static mut [u16],
+    sums: &'static mut [[u16; 3]],
+    pixels: &'static mut [u16],
+) -> ! {
+    paint_stack();
+    let [first, second] = input.levels.each_ref().map(volatile);
+    let atlas = must(Atlas::parse_codes(input.atlas));
+    let mut room = [FrameLight::EMPTY; K];
+    let mut mix = must(FrameMix::new(&atlas, &input.full, &mut room));
+    let finish = must(Finish::new(&atlas, &mix, input.runs, input.exposure, &TONE));
+    set_all(&mut mix, &first);
+    let mut table = must(AnyTable::new(&atlas, &mix, values));
+    let cold = count(|| {
+        set_all(&mut mix, &second);
+        for light in 0..K as u32 {
+            must(table.update(&atlas, &mix, light));
+        }
+        must(full_any(&atlas, &table, &finish, sums, pixels));
+    });
+    let cold_hash = hash(pixels);
+    pixels.fill(0);
+    let warm = count(|| must(full_any(&atlas, &table, &finish, sums, pixels)));
+    same(cold_hash, hash(pixels));
+    report(cold, warm, cold_hash)
+}

@@ -1,0 +1,101 @@
+//! Counts instructions and the stack, and hashes what came out.
+
+use core::cell::UnsafeCell;
+use core::hint::black_box;
+
+use crate::board::{instructions, start_timer, ticks};
+
+/// Instructions that `f` takes, without those of reading the timer.
+pub fn count(f: impl FnOnce()) -> u32 {
+    start_timer();
+    let before = ticks();
+    black_box(());
+    let empty = ticks();
+    black_box(());
+    f();
+    black_box(());
+    let after = ticks();
+    instructions(after - empty) - instructions(empty - before)
+}
+
+/// FNV-1a, 32 bits, of the bytes of pixels, low byte first.
+pub fn hash(pixels: &[u16]) -> u32 {
+    let bytes = pixels.iter().flat_map(|pixel| pixel.to_le_bytes());
+    bytes.fold(0x811c_9dc5, |hash, byte| {
+        (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
+    })
+}
+
+/// Memory that is lent once.
+#[repr(transparent)]
+pub struct Lent<T>(UnsafeCell<T>);
+
+// SAFETY: there is one thread, and `lend` is for one call each.
+unsafe impl<T> Sync for Lent<T> {}
+
+impl<T> Lent<T> {
+    /// Memory with something in it.
+    pub const fn new(value: T) -> Self {
+        Self(UnsafeCell::new(value))
+    }
+
+    /// Lends it.
+    ///
+    /// # Safety
+    /// Once.
+    #[expect(clippy::mut_from_ref, reason = "that is what it is for")]
+    pub unsafe fn lend(&'static self) -> &'static mut T {
+        // SAFETY: the caller does so once.
+        unsafe { &mut *self.0.get() }
+    }
+}
+
+/// What an unused word of the stack holds.
+const PAINT: u32 = 0x5ac3_96e1;
+
+/// No further below the top than this is painted.
+const PAINTED: usize = 64 << 10;
+
+unsafe extern "C" {
+    static mut __sheap: u32;
+    static _stack_start: u32;
+}
+
+/// The bottom and the top of the part of the stack that is painted.
+fn stack() -> (*mut u32, *const u32) {
+    let (bottom, top) = (&raw mut __sheap, &raw const _stack_start);
+    let lowest = (top as usize - PAINTED) as *mut u32;
+    (
+        if (bottom as usize) < lowest as usize {
+            lowest
+        } else {
+            bottom
+        },
+        top,
+    )
+}
+
+/// Paints what of the stack is free.
+#[inline(never)]
+pub fn paint_stack() {
+    let (mut word, _) = stack();
+    let mark = 0_u32;
+    let end = (&raw const mark as usize - 64) as *mut u32;
+    while word < end {
+        // SAFETY: above all statics and below this function's frame.
+        unsafe {
+            word.write_volatile(PAINT);
+            word = word.add(1);
+        }
+    }
+}
+
+/// Bytes of the stack that were in use at some time since it was painted.
+pub fn largest_stack() -> u32 {
+    let (mut word, top) = stack();
+    // SAFETY: inside the stack.
+    while word.cast_const() < top && unsafe { word.read_volatile() } == PAINT {
+        word = unsafe { word.add(1) };
+    }
+    top as u32 - word as u32
+}
