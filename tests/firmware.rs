@@ -1,13 +1,14 @@
 //! The solver on microcontrollers, in an emulator: the same pixels as here, in so many instructions.
 
-mod bake;
 mod inputs;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use std::{env, fs};
+use std::{env, fs, iter};
 
 use inputs::{Input, hash, inputs, write_if_new};
+use relume::atlas::Atlas;
+use relume_host::device_cost::{Core, DeviceCost};
 use serde_json::{Value, json};
 
 /// The images of `tests/firmware`: the binary, its kernel, its input.
@@ -27,6 +28,9 @@ const TARGETS: [&str; 3] = [
     "thumbv7m-none-eabi",
     "thumbv7em-none-eabihf",
 ];
+
+/// The one without hardware for floats.
+const SMALL: &str = TARGETS[0];
 
 /// The light that the `change` images change.
 const CHANGED: usize = 1;
@@ -72,23 +76,23 @@ fn host() -> String {
     host.expect("it says").to_owned()
 }
 
-/// The images of a target: the micro:bit has no room for all tables, the others no need of batches.
+/// The images of a target: the micro:bit has no room for tiles or for all tables, the others need no batches.
 fn images(target: &str) -> Vec<(&'static str, &'static str, &'static str)> {
-    let other = if target.starts_with("thumbv6m") {
-        "full_lum_1920"
+    let others: &[&str] = if target == SMALL {
+        &["full_lum_1920", "full_tiles_960"]
     } else {
-        "batches_lum_1920"
+        &["batches_lum_1920"]
     };
-    IMAGES
-        .into_iter()
-        .filter(|image| image.0 != other)
-        .collect()
+    let images = IMAGES.into_iter();
+    images.filter(|image| !others.contains(&image.0)).collect()
 }
 
-/// Runs a command of cargo in `tests/firmware` for a target.
-fn cargo(target: &str, arguments: &str) -> Output {
+/// Builds images for a target.
+fn build(target: &str, images: &[&str], options: &str) -> Output {
+    let bins = images.join(" --bin ");
     let script = format!(
-        "source .ci/bare-metal.sh {target} && cd tests/firmware && cargo {arguments} --release --locked --target {target}"
+        "source .ci/bare-metal.sh {target} && cd tests/firmware && \
+         cargo build --release --locked --target {target} --bin {bins} {options}"
     );
     Command::new("bash")
         .args(["-c", &script])
@@ -243,11 +247,8 @@ fn images_give_the_pixels_of_the_host_within_their_budgets() {
     }
     for target in TARGETS {
         let images = images(target);
-        let names: Vec<String> = images
-            .iter()
-            .map(|image| format!("--bin {}", image.0))
-            .collect();
-        let built = cargo(target, &format!("build {}", names.join(" ")));
+        let names: Vec<&str> = images.iter().map(|image| image.0).collect();
+        let built = build(target, &names, "");
         let told = String::from_utf8_lossy(&built.stderr);
         assert!(built.status.success(), "{target}: {told}");
         for image in images {
@@ -255,18 +256,107 @@ fn images_give_the_pixels_of_the_host_within_their_budgets() {
             rows.push(row(target, image, input.expect("an input")));
         }
     }
-    write_if_new(
-        &work().join("rows.json"),
-        format!("{:#}\n", json!({"rows": rows})).as_bytes(),
-    );
+    let text = format!("{:#}\n", json!({"rows": rows}));
+    write_if_new(&work().join("rows.json"), text.as_bytes());
+    let shape = |row: &Value| ["kernel", "n", "k"].map(|key| row[key].to_string());
     for row in &rows {
-        let same = rows.iter().filter(|other| {
-            ["kernel", "n", "k"]
-                .iter()
-                .all(|key| other[key] == row[key])
-        });
-        for other in same {
+        for other in rows.iter().filter(|other| shape(other) == shape(row)) {
             assert_eq!(row["hash"], other["hash"], "{row} {other}");
         }
     }
+    check_budgets(&rows);
+    check_predictions(&rows, &inputs);
+    no_float_on_the_small_core();
+    one_index_does_not_link();
+}
+
+/// What may be used is what was used when the budgets were written, and 1 %.
+fn check_budgets(rows: &[Value]) {
+    let path = root().join("tests/firmware/budgets.json");
+    let keys = ["per_frame", "per_frame_warm", "flash", "ram"];
+    let images = rows.iter().filter(|row| !row["image"].is_null());
+    let key = |row: &Value| format!("{} {}", row["target"], row["image"]).replace('"', "");
+    if env::var_os("RELUME_WRITE_BUDGETS").is_some() {
+        let used = images.map(|row| (key(row), json!(keys.map(|key| row[key].clone()))));
+        let used: serde_json::Map<String, Value> = used.collect();
+        fs::write(path, format!("{:#}\n", Value::from(used))).expect("our own tree");
+        return;
+    }
+    let budgets = fs::read_to_string(path).expect("they are checked in");
+    let budgets: Value = serde_json::from_str(&budgets).expect("plain JSON");
+    let mut exceeded = Vec::new();
+    for row in images {
+        for (place, name) in keys.iter().enumerate() {
+            let used = row[*name].as_f64().expect("a number");
+            let budget = budgets[key(row)][place].as_f64().unwrap_or(0.0);
+            if used > 1.01 * budget {
+                exceeded.push(format!("{} {name}: {used}, budget {budget}", key(row)));
+            }
+        }
+    }
+    assert!(exceeded.is_empty(), "{}", exceeded.join("\n"));
+}
+
+/// What `relume info` predicts of frames is within 10 % of what was counted.
+fn check_predictions(rows: &[Value], inputs: &[Input]) {
+    let cores = iter::zip(TARGETS, Core::ALL);
+    for row in rows {
+        let core = cores.clone().find(|(target, _)| row["target"] == *target);
+        let image = IMAGES.iter().find(|image| row["image"] == image.0);
+        let (Some((_, core)), Some((image, kernel, name))) = (core, image) else {
+            continue;
+        };
+        if kernel.starts_with("change") {
+            continue;
+        }
+        let input = inputs.iter().find(|input| input.name == *name);
+        let bytes = &input.expect("an input").atlas;
+        let atlas = Atlas::parse(bytes).expect("an atlas");
+        let cost = DeviceCost::new(&atlas, bytes.len(), core);
+        for (predicted, key) in [
+            (cost.flash, "flash"),
+            (cost.ram, "ram"),
+            (cost.frame, "per_frame_warm"),
+        ] {
+            let counted = row[key].as_f64().expect("a number");
+            let off = (predicted as f64 / counted - 1.0).abs();
+            assert!(
+                off <= 0.1,
+                "{image}, {core:?}, {key}: {predicted} for {counted}"
+            );
+        }
+    }
+}
+
+/// Names of soft-float routines: `__aeabi_fadd`, `__mulsf3`, `__floatsidf` and so on.
+fn is_soft_float(symbol: &str) -> bool {
+    let aeabi = symbol.strip_prefix("__aeabi_").unwrap_or("");
+    let starts = [
+        "fadd", "fsub", "frsub", "fmul", "fdiv", "fcmp", "f2", "i2f", "ui2f", "l2f", "ul2f",
+        "dadd", "dsub", "dmul", "ddiv", "dcmp", "d2", "i2d", "ui2d", "l2d", "ul2d",
+    ];
+    let is_gnu = symbol.starts_with("__") && (symbol.contains("sf") || symbol.contains("df"));
+    is_gnu || starts.iter().any(|start| aeabi.starts_with(start))
+}
+
+fn no_float_on_the_small_core() {
+    assert!(is_soft_float("__aeabi_fmul") && is_soft_float("__mulsf3"));
+    for (name, ..) in images(SMALL) {
+        let image = image(SMALL, name);
+        let output = Command::new("arm-none-eabi-nm").arg(image).output();
+        let text = String::from_utf8(output.expect("binutils").stdout).expect("plain text");
+        let symbols = text.lines().filter_map(|line| line.split(' ').next_back());
+        assert!(symbols.clone().count() > 10, "{name} has symbols");
+        let floats: Vec<&str> = symbols.filter(|symbol| is_soft_float(symbol)).collect();
+        assert!(floats.is_empty(), "{name}: {floats:?}");
+    }
+}
+
+/// The panic handler calls what does not exist: images link because they cannot panic.
+fn one_index_does_not_link() {
+    let output = build(SMALL, &["change_lum_960"], "--features one-index");
+    let told = String::from_utf8_lossy(&output.stderr);
+    let links = output.status.success();
+    assert!(!links, "an index that may be out of range links");
+    assert!(told.contains("a_panic_path_is_left"), "{told}");
 }

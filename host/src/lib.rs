@@ -40,6 +40,8 @@ pub mod probe;
 
 pub mod export;
 
+pub mod device_cost;
+
 pub mod preview;
 
 pub mod polygon_pair;

@@ -1,6 +1,7 @@
 //! What firmware is measured with: atlases, mixes and reflectances, and the pixels that they must give.
 
 use std::fmt::Write as _;
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::{fs, iter};
 
@@ -12,14 +13,12 @@ use relume::relight::{
     full_any, relight, table_length,
 };
 use relume::tone::{Exposure, Rgb565Table, radiance};
-use relume_host::bake::{Method, Settings};
+use relume_host::bake::{Method, Settings, bake};
 use relume_host::builtin::{PaperLamps, paper_room};
 use relume_host::import;
 use relume_host::pack::{Format, Packing, pack};
 use relume_host::scene::OwnedScene;
 use relume_host::solution::Solution;
-
-use crate::bake::baked;
 
 /// As in the images.
 pub static TONE: Rgb565Table = Rgb565Table::new(1024);
@@ -51,7 +50,8 @@ fn solved(scene: &OwnedScene) -> Solution {
         variation: f64::INFINITY,
         ..Settings::default()
     };
-    baked(scene, &settings)
+    let go_on = &mut |_: &_| ControlFlow::Continue(());
+    bake(scene, &settings, go_on).expect("a legal scene")
 }
 
 /// The four inputs.

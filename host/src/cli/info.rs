@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 use super::load::{Loaded, load};
 use super::pack::bits as bits_per_rgb;
 use super::{Outcome, human_bytes, tell};
+use crate::device_cost::{Core, DeviceCost};
 use crate::solution::{self, Solution};
 
 #[derive(Debug, Args)]
@@ -114,9 +115,16 @@ fn of_atlas(atlas: &Atlas, bytes: usize) -> Value {
         "ram": n * 12 + k * size_of::<FixedWeight>() as u64,
         "multiply_adds_per_frame": products,
         "multiply_adds_per_changed_light": n * 3,
+        "devices": Core::ALL.map(|core| device(atlas, bytes, core)),
         "lights": k,
         "per_light": lights.collect::<Vec<_>>(),
     })
+}
+
+/// Predicted by a model that is fitted to counts, see [`DeviceCost`].
+fn device(atlas: &Atlas, bytes: usize, core: Core) -> Value {
+    let DeviceCost { flash, ram, frame } = DeviceCost::new(atlas, bytes, core);
+    json!({"core": core.name(), "flash": flash, "ram": ram, "instructions_per_frame": frame})
 }
 
 /// What the codes of a channel stand for, in display codes and W/m2.

@@ -190,6 +190,13 @@ impl<'a> Atlas<'a> {
         })
     }
 
+    /// What the codes of a light stand for, and the largest of each channel; `None` without such a light.
+    #[must_use]
+    pub fn curves(&self, light: u32) -> Option<([Curve; 3], [u16; 3])> {
+        let record = LightRecord::parse(record(self.lights, light, LIGHT_BYTES))?;
+        Some((record.curves, record.last))
+    }
+
     /// One more than the largest code of any light.
     #[must_use]
     pub fn levels(&self) -> usize {

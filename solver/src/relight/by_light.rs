@@ -5,7 +5,7 @@
 
 use core::num::NonZeroUsize;
 
-use super::frame::{Encode, Finish, FrameMix, Weight};
+use super::frame::{Encode, Finish, FrameMix};
 use super::packed::Form;
 use super::{RelightError, check_elements};
 use crate::atlas::Atlas;
@@ -24,8 +24,7 @@ pub fn add_lights<F: Form>(
     sums.fill(F::Sum::default());
     for light in 0..atlas.light_count() {
         let after = mix.terms(atlas, light, F::BITS)?;
-        let before = after.map(|(_, values)| (Weight::ZERO, values));
-        F::fill(table, 0, &before, &after);
+        F::fill(table, 0, None, &after);
         add::<F>(atlas, light, table, sums)?;
     }
     Ok(())
@@ -47,7 +46,7 @@ pub fn change_light<F: Form>(
     let before = mix.terms(atlas, light, F::BITS)?;
     mix.set(light, levels);
     let after = mix.terms(atlas, light, F::BITS)?;
-    F::fill(table, 0, &before, &after);
+    F::fill(table, 0, Some(&before), &after);
     add::<F>(atlas, light, table, sums)
 }
 
@@ -64,7 +63,7 @@ fn add<F: Form>(
     let rows = codes.chunks_exact(lights.get());
     for (sum, row) in sums.iter_mut().zip(rows) {
         if let Some(codes) = row.get(light as usize) {
-            *sum = F::add(*sum, table, 0, *codes);
+            *sum = F::add(*sum, table, 0, codes);
         }
     }
     Ok(())

@@ -17,7 +17,7 @@ use core::num::NonZeroUsize;
 
 use super::{RelightError, Wide, check_lights};
 use crate::atlas::{Atlas, AtlasLight, Block, LARGEST_SIDE, Tiles};
-use crate::code::{Curve, Magnitude, Scale};
+use crate::code::{Curve, DECODED, DECODED_BITS, Magnitude, Scale};
 use crate::color::Rgb;
 
 /// Linear steps from black up that a display encodes.
@@ -26,8 +26,11 @@ pub const STEPS: u32 = 2048;
 /// Bits of a value, a level, a gain, a reflectance.
 const BITS: i32 = 16;
 
+/// Where the values of the exponential code have 16 bits already.
+const EXPONENTIAL: i32 = -(DECODED_BITS as i32);
+
 /// Elements that are looked at together.
-const CHUNK: usize = 32;
+const CHUNK: usize = 16;
 
 /// The fewest bits of a sum.
 pub(super) const FEWEST_BITS: u32 = 10;
@@ -117,6 +120,24 @@ impl Values {
             curve,
             last,
             exponent: largest.exponent + excess,
+        }
+    }
+
+    /// Calls `f` with one entry and value after the other, from code 0 on.
+    #[inline(always)]
+    pub(super) fn with_codes<E>(
+        &self,
+        entries: impl Iterator<Item = E>,
+        mut f: impl FnMut(E, u32),
+    ) {
+        if matches!(self.curve, Curve::Exponential { .. }) && self.exponent == EXPONENTIAL {
+            for (entry, value) in entries.zip(&DECODED) {
+                f(entry, u32::from(*value));
+            }
+        } else {
+            for (entry, code) in entries.zip(0..) {
+                f(entry, self.of(code));
+            }
         }
     }
 
@@ -310,9 +331,9 @@ impl<'a> FrameMix<'a> {
     ) -> Result<Terms, RelightError> {
         let expected = atlas.light_count();
         let entry = self.lights.get(light as usize);
-        let found = entry.zip(atlas.lights().nth(light as usize));
-        let (entry, light) = found.ok_or(RelightError::Lights { expected })?;
-        Ok(entry.terms(&light, bits))
+        let found = entry.zip(atlas.curves(light));
+        let (entry, (curves, last)) = found.ok_or(RelightError::Lights { expected })?;
+        Ok(entry.terms(curves, last, bits))
     }
 }
 
@@ -320,8 +341,8 @@ impl<'a> FrameMix<'a> {
 pub type Terms = [(Weight, Values); 3];
 
 impl FrameLight {
-    fn terms(&self, light: &AtlasLight, bits: [u32; 3]) -> Terms {
-        let ([r, g, b], [last_r, last_g, last_b]) = (light.curves, light.last);
+    fn terms(&self, curves: [Curve; 3], last: [u16; 3], bits: [u32; 3]) -> Terms {
+        let ([r, g, b], [last_r, last_g, last_b]) = (curves, last);
         let ([gain_r, gain_g, gain_b], [level_r, level_g, level_b]) = (self.gains, self.levels);
         let [bits_r, bits_g, bits_b] = bits;
         [
@@ -337,7 +358,7 @@ impl FrameLight {
             levels: [u16::MAX; 3],
             ..*self
         };
-        full.terms(light, [BITS as u32; 3])
+        full.terms(light.curves, light.last, [BITS as u32; 3])
     }
 }
 

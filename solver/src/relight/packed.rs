@@ -45,7 +45,7 @@ pub trait Form {
     fn fill<const L: usize>(
         table: &mut Self::Table<L>,
         light: usize,
-        before: &Terms,
+        before: Option<&Terms>,
         after: &Terms,
     );
 
@@ -55,7 +55,7 @@ pub trait Form {
         sum: Self::Sum,
         table: &Self::Table<L>,
         light: usize,
-        codes: Self::Codes,
+        codes: &Self::Codes,
     ) -> Self::Sum;
 
     /// What is shown of a sum.
@@ -82,22 +82,29 @@ impl Form for Lum {
     fn fill<const L: usize>(
         table: &mut [[u32; L]; 256],
         light: usize,
-        before: &Terms,
+        before: Option<&Terms>,
         after: &Terms,
     ) {
-        let pack = |[(r, values), (g, _), (b, _)]: &Terms, code| {
-            let value = values.of(code);
+        let [(r, values), (g, _), (b, _)] = after;
+        let [old_r, old_g, old_b] = weights(before);
+        let pack = |r: Weight, g: Weight, b: Weight, value| {
             r.of(value) << 22 | g.of(value) << 10 | b.of(value)
         };
+        let is_new = before.is_none();
         let own = table.iter_mut().filter_map(|lights| lights.get_mut(light));
-        for (entry, code) in own.zip(0..) {
-            *entry = pack(after, code).wrapping_sub(pack(before, code));
-        }
+        values.with_codes(own, |entry, value| {
+            let old = if is_new {
+                0
+            } else {
+                pack(old_r, old_g, old_b, value)
+            };
+            *entry = pack(*r, *g, *b, value).wrapping_sub(old);
+        });
     }
 
     #[inline(always)]
-    fn add<const L: usize>(sum: u32, table: &[[u32; L]; 256], light: usize, code: u8) -> u32 {
-        sum.wrapping_add(entry(table, light, code))
+    fn add<const L: usize>(sum: u32, table: &[[u32; L]; 256], light: usize, code: &u8) -> u32 {
+        sum.wrapping_add(entry(table, light, *code))
     }
 
     #[inline(always)]
@@ -131,16 +138,15 @@ impl Form for Colour {
     fn fill<const L: usize>(
         tables: &mut [[[u16; L]; 256]; 3],
         light: usize,
-        before: &Terms,
+        before: Option<&Terms>,
         after: &Terms,
     ) {
-        for ((table, before), after) in tables.iter_mut().zip(before).zip(after) {
-            let (weight, values) = after;
+        let channels = tables.iter_mut().zip(after).zip(weights(before));
+        for ((table, (weight, values)), old) in channels {
             let own = table.iter_mut().filter_map(|lights| lights.get_mut(light));
-            for (entry, code) in own.zip(0..) {
-                let value = values.of(code);
-                *entry = weight.of(value).wrapping_sub(before.0.of(value)) as u16;
-            }
+            values.with_codes(own, |entry, value| {
+                *entry = weight.of(value).wrapping_sub(old.of(value)) as u16;
+            });
         }
     }
 
@@ -149,14 +155,13 @@ impl Form for Colour {
         sum: [u16; 3],
         tables: &[[[u16; L]; 256]; 3],
         light: usize,
-        codes: [u8; 3],
+        [code_r, code_g, code_b]: &[u8; 3],
     ) -> [u16; 3] {
         let ([r, g, b], [red, green, blue]) = (sum, tables);
-        let [code_r, code_g, code_b] = codes;
         [
-            r.wrapping_add(entry(red, light, code_r)),
-            g.wrapping_add(entry(green, light, code_g)),
-            b.wrapping_add(entry(blue, light, code_b)),
+            r.wrapping_add(entry(red, light, *code_r)),
+            g.wrapping_add(entry(green, light, *code_g)),
+            b.wrapping_add(entry(blue, light, *code_b)),
         ]
     }
 
@@ -180,6 +185,11 @@ fn entry<V: Copy + Default, const L: usize>(table: &[[V; L]; 256], light: usize,
     lights.get(light).copied().unwrap_or_default()
 }
 
+/// The weights of some terms, or of nothing.
+fn weights(terms: Option<&Terms>) -> [Weight; 3] {
+    terms.map_or([Weight::ZERO; 3], |terms| terms.map(|(weight, _)| weight))
+}
+
 /// Multiplies out one light of a mix.
 ///
 /// # Errors
@@ -191,8 +201,7 @@ pub fn fill_table<F: Form, const L: usize>(
     table: &mut F::Table<L>,
 ) -> Result<(), RelightError> {
     let after = mix.terms(atlas, light, F::BITS)?;
-    let before = after.map(|(_, values)| (Weight::ZERO, values));
-    F::fill(table, light as usize, &before, &after);
+    F::fill(table, light as usize, None, &after);
     Ok(())
 }
 
@@ -229,7 +238,7 @@ fn full_run<F: Form, const K: usize, const L: usize, T: Encode>(
     for (row, pixel) in rows.iter().zip(pixels) {
         let mut sum = F::Sum::default();
         for (light, codes) in row.iter().enumerate() {
-            sum = F::add(sum, table, light, *codes);
+            sum = F::add(sum, table, light, codes);
         }
         *pixel = tone.encode(F::steps(sum, factors));
         as_it_is();
@@ -242,6 +251,24 @@ fn show<F: Form, T: Encode>(sums: &[F::Sum], factors: [u16; 3], tone: &T, pixels
     for (pixel, sum) in pixels.iter_mut().zip(sums) {
         *pixel = tone.encode(F::steps(*sum, factors));
         as_it_is();
+    }
+}
+
+/// Adds one light to the sums of some elements.
+#[inline(never)]
+fn add_light<F: Form, const K: usize>(
+    rows: &[[F::Codes; K]],
+    light: usize,
+    table: &F::Table<1>,
+    sums: &mut [F::Sum],
+) {
+    if light >= K {
+        return;
+    }
+    for (sum, row) in sums.iter_mut().zip(rows) {
+        if let Some(codes) = row.get(light) {
+            *sum = F::add(*sum, table, 0, codes);
+        }
     }
 }
 
@@ -275,13 +302,8 @@ impl<'a, F: Form> Sums<'a, F> {
         sums.fill(F::Sum::default());
         for light in 0..K {
             let after = mix.terms(atlas, light as u32, F::BITS)?;
-            let before = after.map(|(_, values)| (Weight::ZERO, values));
-            F::fill(table, 0, &before, &after);
-            for (sum, row) in sums.iter_mut().zip(rows) {
-                if let Some(codes) = row.get(light) {
-                    *sum = F::add(*sum, table, 0, *codes);
-                }
-            }
+            F::fill(table, 0, None, &after);
+            add_light::<F, K>(rows, light, table, sums);
         }
         Ok(Self { sums, table })
     }
@@ -334,7 +356,7 @@ impl<'a, F: Form> Sums<'a, F> {
         let before = mix.terms(atlas, light, F::BITS)?;
         mix.set(light, levels);
         let after = mix.terms(atlas, light, F::BITS)?;
-        F::fill(self.table, 0, &before, &after);
+        F::fill(self.table, 0, Some(&before), &after);
         Ok(())
     }
 
@@ -355,13 +377,8 @@ impl<'a, F: Form> Sums<'a, F> {
         finish.by_run(pixels, |pixels, factors| {
             let own = rows.split_off(..pixels.len()).unwrap_or_default();
             let sums = sums.split_off_mut(..pixels.len()).unwrap_or_default();
-            for ((sum, pixel), row) in sums.iter_mut().zip(pixels).zip(own) {
-                if let Some(codes) = row.get(light) {
-                    *sum = F::add(*sum, table, 0, *codes);
-                }
-                *pixel = finish.tone.encode(F::steps(*sum, factors));
-                as_it_is();
-            }
+            add_light::<F, K>(own, light, table, sums);
+            show::<F, T>(sums, factors, finish.tone, pixels);
         })
     }
 }

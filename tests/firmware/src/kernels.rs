@@ -58,6 +58,14 @@ fn set_all<const K: usize>(mix: &mut FrameMix, levels: &[[u16; 3]; K]) {
     }
 }
 
+/// With the feature `one-index` a panic path, which no image may have.
+fn one_index(pixels: &[u16], at: u32) {
+    #[cfg(feature = "one-index")]
+    black_box(pixels[black_box(at) as usize]);
+    #[cfg(not(feature = "one-index"))]
+    let _ = (pixels, at);
+}
+
 fn report(per_frame: u32, warm: u32, hash: u32) -> ! {
     say(c"per_frame", per_frame);
     say(c"per_frame_warm", warm);
@@ -152,6 +160,7 @@ pub fn run_change<F: Form, const K: usize>(
         must(kept.change::<K, _>(&atlas, &mut mix, (CHANGED, *after), &finish, pixels));
     });
     let changed = hash(pixels);
+    one_index(pixels, changed);
     // What is left when the table is there already.
     let table = count(|| {
         must(kept.set(&atlas, &mut mix, (CHANGED, *before)));

@@ -1,0 +1,147 @@
+//! What an atlas costs on a microcontroller: flash, RAM and instructions of a frame, predicted.
+//!
+//! A frame of `n` elements and `k` lights with tables kept takes `n (a + b k)` instructions by the kernel that reads the atlas's
+//! codes ([`relume::relight::full`], or [`relume::relight::full_any`]); where its table does not fit into the
+//! 16 KiB of a small core, [`relume::relight::Sums`] adds up light by light and fills a table for each. The constants are
+//! fitted to what `tests/firmware` counts; `tests/firmware.rs` holds them to 10 %.
+
+use relume::atlas::Atlas;
+use relume::code::Code;
+use relume::relight::table_length;
+
+/// A core that the solver was counted on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Core {
+    /// Cortex-M0, 16 KiB of RAM.
+    M0,
+    /// Cortex-M3.
+    M3,
+    /// Cortex-M4F.
+    M4F,
+}
+
+impl Core {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::M0, Self::M3, Self::M4F];
+
+    /// Its name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::M0 => "cortex-m0",
+            Self::M3 => "cortex-m3",
+            Self::M4F => "cortex-m4f",
+        }
+    }
+}
+
+/// Predicted for one core.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DeviceCost {
+    /// Bytes of flash: the atlas and the code that relights it.
+    pub flash: u64,
+    /// Bytes of RAM: tables, pixels and the stack.
+    pub ram: u64,
+    /// Instructions of a frame with tables kept, where there is room for them.
+    pub frame: u64,
+}
+
+/// Bytes of RAM that a small core has for tables.
+const SMALL_TABLE: u64 = 12 << 10;
+
+impl DeviceCost {
+    /// Of an atlas of so many bytes.
+    #[must_use]
+    pub fn new(atlas: &Atlas, bytes: usize, core: Core) -> Self {
+        let (n, k) = (
+            f64::from(atlas.element_count()),
+            f64::from(atlas.light_count()),
+        );
+        let lanes = u64::from(atlas.light_count().next_power_of_two());
+        let is_lum = atlas.is_all_in(|code| code == Code::Lum8);
+        let is_colour = atlas.is_all_in(|code| code.bytes() == 3);
+        let elements = u64::from(atlas.element_count());
+        let (model, table) = if is_lum && (core != Core::M0 || 1024 * lanes <= SMALL_TABLE) {
+            (lum(core), 1024 * lanes)
+        } else if is_lum {
+            (LUM_IN_BATCHES, 1024 + 4 * elements)
+        } else if is_colour {
+            (colour(core), 1536 * lanes)
+        } else {
+            (any(core), 2 * table_length(atlas) as u64 + 6 * elements)
+        };
+        Self {
+            flash: bytes as u64 + model.code,
+            ram: table + 2 * elements + model.stack,
+            frame: (n * (model.element + model.code_of_light * k) + model.light * k) as u64,
+        }
+    }
+}
+
+/// Constants of a kernel on a core.
+struct Model {
+    /// Instructions per element.
+    element: f64,
+    /// Instructions per element and light.
+    code_of_light: f64,
+    /// Instructions per light.
+    light: f64,
+    /// Bytes of code and constants.
+    code: u64,
+    /// Bytes of stack.
+    stack: u64,
+}
+
+const fn lum(core: Core) -> Model {
+    let (element, code_of_light, code) = match core {
+        Core::M0 => (35.1, 5.0, 37_000),
+        Core::M3 => (24.6, 4.03, 36_500),
+        Core::M4F => (26.0, 3.98, 36_700),
+    };
+    Model {
+        element,
+        code_of_light,
+        light: 0.0,
+        code,
+        stack: 1_900,
+    }
+}
+
+/// On the M0, a table filled for every light of every frame.
+const LUM_IN_BATCHES: Model = Model {
+    element: 30.0,
+    code_of_light: 7.05,
+    light: 13_200.0,
+    code: 39_000,
+    stack: 2_500,
+};
+
+const fn colour(core: Core) -> Model {
+    let (element, code_of_light, code) = match core {
+        Core::M0 => (27.5, 15.5, 37_300),
+        Core::M3 => (18.4, 12.6, 34_900),
+        Core::M4F => (17.4, 12.6, 36_700),
+    };
+    Model {
+        element,
+        code_of_light,
+        light: 0.0,
+        code,
+        stack: 1_900,
+    }
+}
+
+const fn any(core: Core) -> Model {
+    let (code_of_light, code) = match core {
+        Core::M0 => (900.0, 40_000),
+        Core::M3 => (455.0, 39_000),
+        Core::M4F => (440.0, 39_000),
+    };
+    Model {
+        element: 25.0,
+        code_of_light,
+        light: 0.0,
+        code,
+        stack: 6_400,
+    }
+}
