@@ -315,7 +315,11 @@ fn the_header_is_made_from_the_source() {
 #[test]
 fn a_c_program_relights_on_the_desktop() {
     let library = library("").join("librelume_c.a");
-    let mut found = Vec::new();
+    let compiler = output(Command::new("rustc").arg("-vV"));
+    let host = compiler
+        .lines()
+        .find_map(|line| line.strip_prefix("host: "));
+    let (target, mut found) = (format!("c-{}", host.unwrap()), Vec::new());
     for case in cases() {
         let folder = folder(&format!("desktop-{}", case.input.name));
         case.write_scene(&folder);
@@ -345,9 +349,9 @@ fn a_c_program_relights_on_the_desktop() {
         output(compile.args(["-lpthread", "-ldl", "-lm"]));
         let said = output(&mut Command::new(program));
         case.check(&said, true);
-        found.extend(rows("c-host", case, &said, None));
+        found.extend(rows(&target, case, &said, None));
     }
-    write_rows("c-host", &found);
+    write_rows(&target, &found);
 }
 
 /// Bytes of flash, and of RAM without the stack.
