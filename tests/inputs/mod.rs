@@ -50,8 +50,7 @@ fn solved(scene: &OwnedScene) -> Solution {
         variation: f64::INFINITY,
         ..Settings::default()
     };
-    let go_on = &mut |_: _| ControlFlow::Continue(());
-    bake(scene, &settings, go_on).expect("a legal scene")
+    bake(scene, &settings, &mut |_| ControlFlow::Continue(())).expect("a legal scene")
 }
 
 /// The four inputs.

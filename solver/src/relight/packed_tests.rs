@@ -124,7 +124,7 @@ fn levels_strategy() -> impl Strategy<Value = Vec<[u16; 3]>> {
     proptest::collection::vec(levels, LIGHTS)
 }
 
-fn check<F: Form>(code: Code, levels: &[[u16; 3]], room: impl Fn() -> (F::Table<8>, F::Table<1>))
+fn check<F: Form>(code: Code, levels: &[[u16; 3]], empty: impl Fn() -> (F::Table<8>, F::Table<1>))
 where
     F::Sum: PartialEq + std::fmt::Debug,
 {
@@ -135,7 +135,7 @@ where
     let mut mix = FrameMix::new(&atlas, &[Rgb::WHITE; LIGHTS], &mut room).unwrap();
     let finish = Finish::new(&atlas, &mix, &RUNS, exposure.factor(), &TONE).unwrap();
     let fill = |mix: &FrameMix| {
-        let (mut table, _) = room();
+        let (mut table, _) = empty();
         for light in 0..LIGHTS as u32 {
             fill_table::<F, 8>(&atlas, mix, light, &mut table).unwrap();
         }
@@ -154,7 +154,7 @@ where
     assert_close(&pixels, &irradiance, exposure);
 
     // The sums of a change are those of a full frame, and undoing it restores them.
-    let (mut sums, mut own) = (vec![F::Sum::default(); ELEMENTS as usize], room().1);
+    let (mut sums, mut own) = (vec![F::Sum::default(); ELEMENTS as usize], empty().1);
     let mut kept = Sums::<F>::new::<LIGHTS>(&atlas, &mix, &mut sums, &mut own).unwrap();
     let mut changed = vec![0; ELEMENTS as usize];
     kept.show(&finish, &mut changed).unwrap();
