@@ -3,8 +3,6 @@
 //!
 //! Whatever is not installed is a failure in CI (variable `CI`); elsewhere a test says what it did not run.
 
-#[expect(dead_code, reason = "other tests use the rest")]
-mod bake;
 #[expect(dead_code, reason = "the bare-metal images use the rest")]
 mod inputs;
 
@@ -23,6 +21,7 @@ use relume::relight::{
 };
 use relume::tone::Rgb888Table;
 use relume_host::export::firmware::{Language, files};
+use serde_json::{Value, json};
 
 /// The light that is changed, as in the images of `tests/firmware`.
 const CHANGED: usize = 1;
@@ -187,6 +186,10 @@ impl Case {
         }
     }
 
+    fn elements(&self) -> u32 {
+        self.input.runs.iter().map(|run| run.elements).sum()
+    }
+
     /// Writes what `relight.c` includes: the atlas as `relume export --c` does, and numbers.
     fn write_scene(&self, folder: &Path) {
         let Input {
@@ -230,18 +233,60 @@ impl Case {
     fn check(&self, said: &str, with_large: bool) {
         let large = self.large.iter().filter(|_| with_large);
         for (name, expected) in self.expected.iter().chain(large) {
-            let mut lines = said.lines().filter_map(|line| line.split_once(' '));
-            let found = lines
-                .find(|(found, _)| found == name)
-                .map(|(_, value)| value.trim());
+            let found = number(said, name);
             assert_eq!(
                 found,
-                Some(&*expected.to_string()),
+                Some(*expected),
                 "{} {name}:\n{said}",
                 self.input.name
             );
         }
     }
+}
+
+/// The number after a name at the beginning of a line.
+fn number(said: &str, name: &str) -> Option<u32> {
+    let mut lines = said.lines().filter_map(|line| line.split_once(' '));
+    lines
+        .find(|(found, _)| *found == name)?
+        .1
+        .trim()
+        .parse()
+        .ok()
+}
+
+/// The rows of a program for `tests/firmware/run --json`; `size` is that of flash and RAM without the stack, where
+/// instructions were counted, too.
+fn rows(target: &str, case: &Case, said: &str, size: Option<[u64; 2]>) -> Vec<Value> {
+    let (n, k) = (case.elements(), case.input.full.len() as u32);
+    let (form, _) = case.input.name.split_once('_').unwrap();
+    let kernels = [("full", "count_sums", n * k), ("change", "count_change", n)];
+    let row = |(kernel, count, share): (&str, &str, u32)| {
+        let hash = number(said, &format!("{kernel}_565")).unwrap();
+        let mut row = json!({
+            "target": target, "kernel": format!("{kernel}_{form}_565"), "n": n, "k": k,
+            "hash": format!("{hash:08x}"),
+        });
+        if let Some([flash, ram]) = size {
+            // Tables are always made anew: there is no warm frame.
+            let frame = number(said, count).unwrap() + number(said, "count_show").unwrap();
+            row["per_frame"] = frame.into();
+            row["per_frame_warm"] = frame.into();
+            row["per_element_light"] = (f64::from(frame) / f64::from(share)).into();
+            row["flash"] = flash.into();
+            row["ram"] = ram.into();
+        }
+        row
+    };
+    kernels.map(row).into()
+}
+
+/// Leaves rows, one a line, where `tests/firmware/run` finds them.
+fn write_rows(target: &str, rows: &[Value]) {
+    let folder = root().join("target/firmware/c-rows");
+    fs::create_dir_all(&folder).unwrap();
+    let lines: String = rows.iter().map(|row| format!("{row}\n")).collect();
+    fs::write(folder.join(target), lines).unwrap();
 }
 
 #[test]
@@ -270,6 +315,11 @@ fn the_header_is_made_from_the_source() {
 #[test]
 fn a_c_program_relights_on_the_desktop() {
     let library = library("").join("librelume_c.a");
+    let compiler = output(Command::new("rustc").arg("-vV"));
+    let host = compiler
+        .lines()
+        .find_map(|line| line.strip_prefix("host: "));
+    let (target, mut found) = (format!("c-{}", host.unwrap()), Vec::new());
     for case in cases() {
         let folder = folder(&format!("desktop-{}", case.input.name));
         case.write_scene(&folder);
@@ -297,8 +347,22 @@ fn a_c_program_relights_on_the_desktop() {
             .arg("-o")
             .arg(&program);
         output(compile.args(["-lpthread", "-ldl", "-lm"]));
-        case.check(&output(&mut Command::new(program)), true);
+        let said = output(&mut Command::new(program));
+        case.check(&said, true);
+        found.extend(rows(&target, case, &said, None));
     }
+    write_rows(&target, &found);
+}
+
+/// Bytes of flash, and of RAM without the stack.
+fn size(program: &Path) -> [u64; 2] {
+    let told = output(Command::new("arm-none-eabi-size").arg(program));
+    let numbers = told.lines().nth(1).unwrap().split_whitespace();
+    let numbers: Vec<u64> = numbers
+        .take(3)
+        .map(|number| number.parse().unwrap())
+        .collect();
+    [numbers[0] + numbers[1], numbers[1] + numbers[2]]
 }
 
 /// A board that QEMU emulates.
@@ -334,6 +398,7 @@ impl Board {
             return;
         }
         let library = library(self.target).join("librelume_c.a");
+        let (target, mut all) = (format!("c-{}", self.target), Vec::new());
         for case in cases() {
             let folder = folder(&format!("{}-{}", self.target, case.input.name));
             case.write_scene(&folder);
@@ -367,7 +432,9 @@ impl Board {
             );
             case.check(&said, !self.compiler.contains(&"-DSMALL"));
             println!("{} {}\n{said}", self.target, case.input.name);
+            all.extend(rows(&target, case, &said, Some(size(&program))));
         }
+        write_rows(&target, &all);
     }
 
     fn compile(&self, folder: &Path, library: &Path) -> PathBuf {
@@ -409,10 +476,6 @@ impl Board {
             compile.arg(format!("-Wl,--defsym={name}_size={size}"));
         }
         output(compile.arg("-o").arg(&program));
-        println!(
-            "{}",
-            output(Command::new("arm-none-eabi-size").arg(&program))
-        );
         program
     }
 }
@@ -435,6 +498,7 @@ fn javascript_relights_by_web_assembly() {
         return;
     }
     let library = library(target).join("relume_c.wasm");
+    let mut found = Vec::new();
     for case in cases() {
         let Input {
             name,
@@ -447,7 +511,7 @@ fn javascript_relights_by_web_assembly() {
         let folder = folder(&format!("wasm-{name}"));
         let [bytes, scene] = ["room.atlas", "scene.json"].map(|name| folder.join(name));
         fs::write(&bytes, atlas).unwrap();
-        let numbers = serde_json::json!({
+        let numbers = json!({
             "full": full.iter().map(|full| full.to_array()).collect::<Vec<_>>(),
             "levels": levels,
             "runs": runs.iter().map(|run| (run.elements, run.reflectance)).collect::<Vec<_>>(),
@@ -457,7 +521,10 @@ fn javascript_relights_by_web_assembly() {
         fs::write(&scene, numbers.to_string()).unwrap();
         let mut node = Command::new("node");
         node.arg(root().join("tests/c_library/relight.mjs"));
-        case.check(&output(node.args([&library, &bytes, &scene])), true);
+        let said = output(node.args([&library, &bytes, &scene]));
+        case.check(&said, true);
+        found.extend(rows(target, case, &said, None));
     }
+    write_rows(target, &found);
     println!("{target}: {} bytes", fs::metadata(library).unwrap().len());
 }

@@ -44,20 +44,20 @@ pub trait RowFiller {
     /// Direct irradiance of every element by a luminaire at unit emission, W/m2.
     fn luminaire(&self, mesh: &Mesh, luminaire: &Luminaire, far: f32, row: &mut [f32]);
 
-    /// Form factors from every element to a polygon: a patch, or a whole lamp.
-    fn shooter(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]);
+    /// Form factors from every element to a patch, or a whole lamp.
+    fn shooter(&self, mesh: &Mesh, shooter: &Shooter, row: &mut [f32]);
 
     /// Form factors from every element to a patch; zeros for one that the mesh does not have.
     fn patch(&self, mesh: &Mesh, patch: u32, row: &mut [f32]) {
-        match mesh.patch_polygon(patch) {
-            Some(polygon) => self.shooter(mesh, &polygon, row),
+        match Shooter::of_patch(mesh, patch, self.visibility()) {
+            Some(shooter) => self.shooter(mesh, &shooter, row),
             None => row.fill(0.0),
         }
     }
 
     /// The same for a whole lamp, which may be large and seen through much.
     fn lamp(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
-        self.shooter(mesh, polygon, row);
+        self.shooter(mesh, &Shooter::new(*polygon), row);
     }
 
     /// Estimates of the form factors from every element to a polygon.
@@ -115,8 +115,8 @@ impl RowFiller for Serial<'_> {
         luminaire::fill(mesh, luminaire, far, 0, &self.0, row);
     }
 
-    fn shooter(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
-        form_factor::fill(mesh, &Shooter::new(*polygon), 0, &self.0, row);
+    fn shooter(&self, mesh: &Mesh, shooter: &Shooter, row: &mut [f32]) {
+        form_factor::fill(mesh, shooter, 0, &self.0, row);
     }
 }
 
@@ -175,14 +175,13 @@ impl RowFiller for Parallel<'_> {
             });
     }
 
-    fn shooter(&self, _: &Mesh, polygon: &Polygon, row: &mut [f32]) {
-        let shooter = Shooter::new(*polygon);
+    fn shooter(&self, _: &Mesh, shooter: &Shooter, row: &mut [f32]) {
         self.fill(row, |receiver, range| {
             let view = shooter.seen_by(receiver, self.bvh);
             if view.is_exact() {
                 return self.seen(&view, range, self.bvh);
             }
-            let narrowed = self.bvh.narrowed(&shaft(polygon, receiver));
+            let narrowed = self.bvh.narrowed(&shaft(shooter.polygon(), receiver));
             self.seen(&view, range, &narrowed)
         });
     }

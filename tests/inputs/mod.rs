@@ -53,7 +53,8 @@ fn solved(scene: &OwnedScene) -> Solution {
         variation: f64::INFINITY,
         ..Settings::default()
     };
-    bake(scene, &settings, &mut |_| ControlFlow::Continue(())).expect("a legal scene")
+    let go_on = &mut |_: _| ControlFlow::Continue(());
+    bake(scene, &settings, go_on).expect("a legal scene")
 }
 
 /// The four inputs.

@@ -7,7 +7,7 @@
 use std::cell::Cell;
 use std::ops::ControlFlow;
 
-use super::{BakeError, Meshed, Progress, Settings, estimate};
+use super::{BakeError, Baked, Meshed, Progress, Settings};
 use crate::gather::Hits;
 use crate::mesh;
 use crate::scene::OwnedScene;
@@ -54,12 +54,13 @@ pub(super) fn bake_to(
     let mut bakes = 0;
     loop {
         settings.element = Some(element);
-        let (solution, hits) = Meshed::new(scene, settings.patch, settings.element, &mut watch)?
-            .solve(&settings, &mut watch)?;
+        let Baked {
+            solution,
+            hits,
+            of_mesh,
+        } = Meshed::new(scene, settings.patch, settings.element, &mut watch)?
+            .bake(&settings, &mut watch)?;
         bakes += 1;
-        let lights = solution.lights.len();
-        let of_mesh = estimate::mesh_errors(&solution.mesh, &solution.contributions, lights);
-        let of_mesh = of_mesh.into_iter().fold(0.0, f32::max);
         let worst = solution.lights.iter().map(|light| light.error);
         let is_met = worst.fold(0.0, f32::max) <= goal;
         // A mesh without any error would let elements grow without end.

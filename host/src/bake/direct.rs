@@ -94,9 +94,9 @@ pub(super) fn visit(
         if job.ends(rows, most, 1.0) {
             break;
         }
-        match lamps {
-            Lamps::Whole => filler.lamp(&view, polygon, &mut row),
-            Lamps::Waiting | Lamps::Patches => filler.shooter(&view, polygon, &mut row),
+        match source {
+            DirectSource::Patch(patch) => filler.patch(&view, *patch, &mut row),
+            DirectSource::Luminaire | DirectSource::Face => filler.lamp(&view, polygon, &mut row),
         }
         rows += 1;
         visit(DirectRow {

@@ -8,6 +8,7 @@
 
 mod facet;
 mod nearest;
+mod stacks;
 
 use std::time::Duration;
 
@@ -26,6 +27,7 @@ use relume::visibility::{Body, Bounds, Obstacle, Shaft, Visibility, bodies};
 
 use nearest::Facets;
 pub use nearest::{Caster, PointCaster};
+use stacks::Stacks;
 
 /// Surfaces in a tree of boxes.
 pub struct Bvh {
@@ -39,6 +41,8 @@ pub struct Bvh {
     body_of: Vec<Option<usize>>,
     /// The same surfaces as rays meet them that look for the nearest.
     facets: Facets,
+    /// Surfaces on top of others.
+    stacks: Stacks,
 }
 
 impl std::fmt::Debug for Bvh {
@@ -126,6 +130,7 @@ impl Bvh {
             body.surfaces().contains(surface).then_some(after)
         };
         Self {
+            stacks: Stacks::new(surfaces, &tree),
             body_of: order.iter().map(body_of).collect(),
             polygons: order
                 .iter()
@@ -175,30 +180,20 @@ impl Bvh {
     /// The surfaces that a shaft admits, with their numbers and in the order of these.
     fn admitted(&self, shaft: &Shaft) -> Vec<(u32, Obstacle<'_>)> {
         let mut found = Vec::new();
-        let mut waiting: Vec<usize> = Vec::with_capacity(64);
-        waiting.extend((!self.tree.nodes.is_empty()).then_some(0));
-        while let Some(node) = waiting.pop() {
-            let node = &self.tree.nodes[node];
-            let bounds = Bounds {
-                low: node.aabb.min.into(),
-                high: node.aabb.max.into(),
-            };
-            if shaft.misses(bounds) {
-                continue;
-            }
-            let first = node.first_index as usize;
-            if node.is_leaf() {
-                let leaf = first..first + node.prim_count as usize;
-                let admitted = leaf.filter(|index| shaft.admits(&self.polygons[*index]));
-                found.extend(admitted.map(|index| {
-                    let body = self.body_of[index].map(|body| &self.bodies[body]);
-                    let polygon = &self.polygons[index];
-                    (self.surfaces[index], Obstacle { polygon, body })
-                }));
-            } else {
-                waiting.extend([first, first + 1]);
-            }
-        }
+        let misses = |bounds: &Aabb| {
+            shaft.misses(Bounds {
+                low: bounds.min.into(),
+                high: bounds.max.into(),
+            })
+        };
+        visit_leaves(&self.tree, misses, |leaf| {
+            let admitted = leaf.filter(|index| shaft.admits(&self.polygons[*index]));
+            found.extend(admitted.map(|index| {
+                let body = self.body_of[index].map(|body| &self.bodies[body]);
+                let polygon = &self.polygons[index];
+                (self.surfaces[index], Obstacle { polygon, body })
+            }));
+        });
         found.sort_unstable_by_key(|(surface, _)| *surface);
         found
     }
@@ -241,6 +236,28 @@ impl<'a> Narrowed<'a> {
     }
 }
 
+/// Visits what lies in the leaves that no box around them keeps off.
+fn visit_leaves(
+    tree: &Bvh2,
+    misses: impl Fn(&Aabb) -> bool,
+    mut visit: impl FnMut(std::ops::Range<usize>),
+) {
+    let mut waiting: Vec<usize> = Vec::with_capacity(64);
+    waiting.extend((!tree.nodes.is_empty()).then_some(0));
+    while let Some(node) = waiting.pop() {
+        let node = &tree.nodes[node];
+        if misses(&node.aabb) {
+            continue;
+        }
+        let first = node.first_index as usize;
+        if node.is_leaf() {
+            visit(first..first + node.prim_count as usize);
+        } else {
+            waiting.extend([first, first + 1]);
+        }
+    }
+}
+
 impl Visibility for Narrowed<'_> {
     fn sees(&self, from: Vec3, to: Vec3) -> bool {
         self.bvh.sees(from, to)
@@ -272,6 +289,10 @@ impl Visibility for Bvh {
         for (_, obstacle) in self.admitted(shaft) {
             visit(obstacle);
         }
+    }
+
+    fn above(&self, surface: u32, facing: Vec3, visit: &mut impl FnMut(&Polygon)) {
+        self.stacks.above(surface, facing).for_each(visit);
     }
 }
 

@@ -397,22 +397,24 @@ mod tests {
                 // To as far as the scene is wide: what is nearest stands between, or nothing does.
                 let is_free = hit.is_none_or(|hit| hit.distance >= size);
                 prop_assert_eq!(caster.sees(from, from + direction * size), is_free, "{:?}", hit);
-                for (surface, number) in surfaces.iter().zip(0..) {
-                    let polygon = surface.polygon();
-                    let tolerance = 4.0 * f64::from(polygon.height(Vec3::splat(farthest)).1);
-                    let (distance, cosine, inside) = crossing(polygon, from, direction);
-                    if cosine < 1e-3 {
-                        continue;
-                    }
-                    let slack = tolerance / cosine;
-                    let found = hit.filter(|hit| hit.surface == number);
-                    if let Some(found) = found {
-                        prop_assert!((f64::from(found.distance) - distance).abs() <= slack);
-                        prop_assert!(inside >= -slack, "{inside} {slack}");
-                        prop_assert_eq!(found.front, direction.dot(polygon.normal()) < 0.0);
-                    } else if distance > slack && inside > slack {
-                        let nearer = hit.is_some_and(|hit| f64::from(hit.distance) <= distance + slack);
-                        prop_assert!(nearer, "{number} at {distance}: {hit:?}");
+                for hit in [hit, bvh.caster_from(from).nearest(direction)] {
+                    for (surface, number) in surfaces.iter().zip(0..) {
+                        let polygon = surface.polygon();
+                        let tolerance = 4.0 * f64::from(polygon.height(Vec3::splat(farthest)).1);
+                        let (distance, cosine, inside) = crossing(polygon, from, direction);
+                        if cosine < 1e-3 {
+                            continue;
+                        }
+                        let slack = tolerance / cosine;
+                        let found = hit.filter(|hit| hit.surface == number);
+                        if let Some(found) = found {
+                            prop_assert!((f64::from(found.distance) - distance).abs() <= slack);
+                            prop_assert!(inside >= -slack, "{inside} {slack}");
+                            prop_assert_eq!(found.front, direction.dot(polygon.normal()) < 0.0);
+                        } else if distance > slack && inside > slack {
+                            let nearer = hit.is_some_and(|hit| f64::from(hit.distance) <= distance + slack);
+                            prop_assert!(nearer, "{number} at {distance}: {hit:?}");
+                        }
                     }
                 }
             }
@@ -455,6 +457,7 @@ mod tests {
                 let across = (x * cosine + y * sine) * u.sqrt();
                 let direction = across + polygon.normal() * (1.0 - u).sqrt();
                 caster.nearest(from, direction).is_none()
+                    || bvh.caster_from(from).nearest(direction).is_none()
             };
             let escaped = (0..RAYS).filter(escapes).count();
             assert_eq!(escaped, 0, "of {RAYS}, {size} {parts}");

@@ -1,8 +1,10 @@
 //! `relume study`.
 
 mod accuracy;
+mod estimates;
 mod paper;
 mod quantization;
+mod scale;
 mod stability;
 mod table;
 
@@ -32,6 +34,10 @@ enum Name {
     Stability,
     /// The tables of the papers beside ours
     Paper,
+    /// The error that a bake estimates over the true one, for every scene of the data (reads RELUME_DATA)
+    Estimates,
+    /// Time and memory over the number of elements, in a scene of 14 000 polygons (reads RELUME_DATA)
+    Scale,
     /// Formats of contributions: error against number of lights and against bits
     Quantization,
 }
@@ -43,7 +49,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome> {
         Name::Accuracy => accuracy::run(folder)?,
         Name::Stability => stability::run(folder)?,
         Name::Paper => paper::run(folder)?,
+        Name::Estimates => estimates::run(folder)?,
+        Name::Scale => scale::run(folder)?,
         Name::Quantization => quantization::run(folder)?,
     };
     Ok(Outcome::done(report))
+}
+
+/// The folder with the scenes that are not part of the program.
+fn data() -> PathBuf {
+    std::env::var_os("RELUME_DATA").map_or_else(|| "../shared/data".into(), PathBuf::from)
 }

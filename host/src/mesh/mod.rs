@@ -4,6 +4,7 @@ mod centre;
 mod locate;
 mod reach;
 mod split;
+mod spread;
 
 use std::ops::ControlFlow;
 
@@ -20,6 +21,7 @@ use crate::scene::OwnedScene;
 pub use centre::{Centred, centred, placed};
 pub use locate::Locator;
 pub use split::{Direct, Split, split};
+pub use spread::{Place, spread};
 
 /// Elements that the default spacing aims at.
 const DEFAULT_ELEMENTS: f32 = 8000.0;

@@ -11,6 +11,7 @@
 use std::f32::consts::PI;
 
 use glam::Vec3;
+use relume::form_factor::Shooter;
 use relume::geometry::{Polygon, clip};
 use relume::luminaire;
 use relume::mesh::{Mesh, Side};
@@ -44,7 +45,8 @@ impl RowFiller for Hemicube<'_> {
         luminaire::fill(mesh, luminaire, far, 0, self.bvh, row);
     }
 
-    fn shooter(&self, mesh: &Mesh, shooter: &Polygon, row: &mut [f32]) {
+    fn shooter(&self, mesh: &Mesh, shooter: &Shooter, row: &mut [f32]) {
+        let shooter = shooter.polygon();
         row.fill(0.0);
         let seen = self.seen_from(mesh, shooter.center());
         for face in faces(shooter.normal()) {

@@ -4,10 +4,12 @@
 //! use for it, it lives here.
 
 pub mod accuracy;
+pub mod estimates;
 pub mod hemicube;
 pub mod paper;
 pub mod quantization;
 pub mod ray_rows;
+pub mod scale;
 pub mod shooting;
 pub mod stability;
 pub mod system;

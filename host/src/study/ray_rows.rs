@@ -10,8 +10,8 @@
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
-use relume::form_factor::point_to_polygon;
-use relume::geometry::{Polygon, from_unit_square};
+use relume::form_factor::{Shooter, point_to_polygon};
+use relume::geometry::from_unit_square;
 use relume::luminaire;
 use relume::mesh::Mesh;
 use relume::scene::Luminaire;
@@ -38,7 +38,8 @@ impl RowFiller for RayRows<'_> {
         luminaire::fill(mesh, luminaire, far, 0, self.bvh, row);
     }
 
-    fn shooter(&self, mesh: &Mesh, shooter: &Polygon, row: &mut [f32]) {
+    fn shooter(&self, mesh: &Mesh, shooter: &Shooter, row: &mut [f32]) {
+        let shooter = shooter.polygon();
         row.fill(0.0);
         let side = self.side as f32;
         let middles = (0..self.side * self.side).map(|part| {

@@ -117,6 +117,29 @@ impl Truth {
         };
         Errors((0..lights).map(error_of).collect())
     }
+
+    /// Relative L1 error of every light, with most of the truth's noise left out:
+    /// `sum_j A_j sqrt(max((E_jm - T_jm)^2 - s_jm^2, 0)) / sum_j A_j T_jm`, summed over the channels.
+    /// Beside it the noise, `sum_j A_j s_jm / sum_j A_j T_jm`: an error that is no larger is not seen.
+    #[must_use]
+    pub fn relative_l1(&self, found: impl Fn(usize, usize) -> [f32; 3]) -> Vec<[f64; 2]> {
+        let lights = self.values.first().map_or(0, Vec::len);
+        let error_of = |light: usize| {
+            let (mut sum, mut noises, mut norm) = (0.0, 0.0, 0.0);
+            for (place, (area, truth)) in self.areas.iter().zip(&self.values).enumerate() {
+                for (channel, found) in found(place, light).into_iter().enumerate() {
+                    let exact = truth[light].irradiance[channel];
+                    let noise = truth[light].error[channel];
+                    let square = (f64::from(found) - exact).powi(2) - noise.powi(2);
+                    sum += area * square.max(0.0).sqrt();
+                    noises += area * noise;
+                    norm += area * exact;
+                }
+            }
+            [sum, noises].map(|sum| sum / norm.max(f64::MIN_POSITIVE))
+        };
+        (0..lights).map(error_of).collect()
+    }
 }
 
 /// The dense solution in which the patches of the mesh shoot.

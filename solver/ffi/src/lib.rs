@@ -32,6 +32,18 @@ mod frame;
 
 mod irradiance;
 
+pub use atlas::{
+    RelumeAtlas, RelumeInfo, RelumeLight, RelumeQuantity, RelumeRgb, relume_atlas_info,
+    relume_atlas_light, relume_atlas_parse,
+};
+pub use frame::{
+    RelumeFinish, RelumeFrame, RelumeLevels, RelumeRgb565Table, RelumeRgb888Table, RelumeRun,
+    relume_frame_change, relume_frame_full, relume_frame_make, relume_frame_rgb565,
+    relume_frame_rgb888, relume_rgb565, relume_rgb565_bright, relume_rgb888, relume_rgb888_bright,
+};
+pub use irradiance::{RELUME_LIGHT_WORDS, relume_irradiance};
+pub use status::RelumeStatus;
+
 #[cfg(any(target_os = "none", target_family = "wasm"))]
 mod panic {
     use core::panic::PanicInfo;

@@ -33,10 +33,15 @@ pub use view::{Receiver, View};
 /// Most surfaces that may stand between one receiver and one shooter to be met one by one.
 const BLOCKERS: usize = 48;
 
+/// Most surfaces on top of a shooter that are told apart; those beyond hide nothing.
+const COVERS: usize = 4;
+
 /// A patch that shoots, with the points at which its visibility is sampled.
 #[derive(Clone, Debug)]
 pub struct Shooter {
     polygon: Polygon,
+    /// What lies on top of it, in its plane.
+    covers: Vec<Polygon, COVERS>,
     /// Four interleaved sets of four points, each with its share of the area.
     samples: [Vec<SamplePoint, 4>; 4],
 }
@@ -58,8 +63,26 @@ impl Shooter {
         };
         Self {
             polygon,
+            covers: Vec::new(),
             samples: [set(Vec2::ZERO), set(Vec2::ONE), set(Vec2::X), set(Vec2::Y)],
         }
+    }
+
+    /// A patch of a mesh, without what lies on top of it; `None` for one that the mesh does not have.
+    #[must_use]
+    pub fn of_patch(mesh: &Mesh, patch: u32, visibility: &impl Visibility) -> Option<Self> {
+        let mut shooter = Self::new(mesh.patch_polygon(patch)?);
+        let face = mesh.patches.get(patch as usize)?.face;
+        let surface = mesh.faces.get(face as usize)?.surface;
+        let facing = shooter.polygon.normal();
+        visibility.above(surface, facing, &mut |cover| {
+            let _ = shooter.covers.push(*cover);
+        });
+        Some(shooter)
+    }
+
+    fn is_covered(&self, point: Vec3) -> bool {
+        self.covers.iter().any(|cover| cover.holds(point))
     }
 
     /// The polygon that shoots.
@@ -184,11 +207,10 @@ fn fill_with(
 ///
 /// A patch that the mesh does not have gives a row of zeros.
 pub fn row(mesh: &Mesh, patch: u32, visibility: &impl Visibility, row: &mut [f32]) {
-    let Some(polygon) = mesh.patch_polygon(patch) else {
-        row.fill(0.0);
-        return;
-    };
-    fill(mesh, &Shooter::new(polygon), 0, visibility, row);
+    match Shooter::of_patch(mesh, patch, visibility) {
+        Some(shooter) => fill(mesh, &shooter, 0, visibility, row),
+        None => row.fill(0.0),
+    }
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use core::f32::consts::PI;
 use super::*;
 use crate::color::Rgb;
 use crate::scene::Surface;
-use crate::visibility::{Obstacle, Occluders, Shaft};
+use crate::visibility::{Body, Obstacle, Occluders, OccludersAndBodies, Shaft, bodies};
 use proptest::prelude::*;
 use std::vec::Vec;
 
@@ -15,6 +15,33 @@ impl Visibility for Open {
     }
 
     fn between<'v>(&'v self, _: &Shaft, _: &mut impl FnMut(Obstacle<'v>)) {}
+}
+
+/// A box with a corner at `low` and edges along two turned axes and upwards, its faces outwards.
+fn block(low: Vec3, turn: f32, size: Vec3) -> Vec<Surface> {
+    let (sine, cosine) = (libm::sinf(turn), libm::cosf(turn));
+    let axes = [
+        Vec3::new(cosine, sine, 0.0) * size.x,
+        Vec3::new(-sine, cosine, 0.0) * size.y,
+        Vec3::Z * size.z,
+    ];
+    let corner = |n: usize| {
+        let along = (0..3).map(|axis| axes[axis] * f32::from(u8::from(n >> axis & 1 == 1)));
+        low + along.sum::<Vec3>()
+    };
+    let faces = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    let faces = faces.map(|face| face.map(corner));
+    faces
+        .iter()
+        .map(|face| Surface::new(0, face, Rgb::BLACK).unwrap())
+        .collect()
 }
 
 /// Unit square at height `z`, facing down.
@@ -220,5 +247,24 @@ proptest! {
         // Both average the same points wherever something may block.
         let open = shooter.form_factor(&receiver, &Open).max(shooter.estimate(&receiver, &Open));
         prop_assert!(blocked <= open * 1.000_01 + 1e-6, "{blocked} {open}");
+    }
+}
+
+proptest! {
+    #[test]
+    fn a_body_hides_what_its_faces_hide(
+        (x, y, z) in (-0.2_f32..0.8, -0.2_f32..0.8, 0.01_f32..0.6),
+        (a, b, c) in (0.05_f32..0.6, 0.05_f32..0.6, 0.02_f32..0.6),
+        turn in -1.5_f32..1.5,
+    ) {
+        let surfaces = block(Vec3::new(x, y, z), turn, Vec3::new(a, b, c));
+        let found: Vec<Body> = bodies(&surfaces).collect();
+        prop_assert_eq!(found.len(), 1);
+        let (receiver, shooter) = (floor(), Shooter::new(ceiling(1.0)));
+        let together = OccludersAndBodies { surfaces: &surfaces, bodies: &found };
+        let alone = shooter.form_factor(&receiver, &Occluders(&surfaces));
+        let together = shooter.form_factor(&receiver, &together);
+        // Slivers between the shadows of faces that share an edge.
+        prop_assert!((alone - together).abs() < 1e-5, "{} {}", alone, together);
     }
 }

@@ -161,6 +161,9 @@ impl<'s> View<'s> {
                 view.outline.clear();
             }
         }
+        for cover in &shooter.covers {
+            view.is_exact &= view.blockers.push(Blocker::cover(cover, origin)).is_ok();
+        }
         view
     }
 
@@ -295,7 +298,8 @@ impl<'s> View<'s> {
             }
             let kernel = sample.weight * cosines / (square * square);
             total += kernel;
-            if visibility.sees(point, sample.position) {
+            if !self.shooter.is_covered(sample.position) && visibility.sees(point, sample.position)
+            {
                 seen += kernel;
             }
         }

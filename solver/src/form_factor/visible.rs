@@ -81,6 +81,15 @@ impl<'v> Blocker<'v> {
         Some(Self::Face { plane, outline })
     }
 
+    /// A surface in the plane of the seen one, on top of it.
+    pub(super) fn cover(surface: &Polygon, origin: Vec3) -> Self {
+        let vertices = surface.vertices().iter();
+        Self::Face {
+            plane: surface.plane(),
+            outline: vertices.map(|v| *v - origin).collect(),
+        }
+    }
+
     /// A body; `None` where a point with these corners around it may be inside, or the plane of `seen` cuts it.
     pub(super) fn body(seen: &Polygon, body: &'v Body, corners: &[Vec3]) -> Option<Self> {
         (body.is_before(&seen.plane()) && body.is_outside(corners)).then_some(Self::Body(body))

@@ -292,6 +292,13 @@ impl Polygon {
         self.plane().height(p)
     }
 
+    /// True when a point of the polygon's plane is not outside its outline.
+    #[must_use]
+    pub fn holds(&self, p: Vec3) -> bool {
+        self.edges()
+            .all(|(a, b)| (b - a).cross(p - a).dot(self.normal) >= 0.0)
+    }
+
     /// Where the open segment from `from` to `to` crosses the polygon, as a fraction of its
     /// length; `None` when it does not.
     ///
@@ -320,7 +327,7 @@ impl Polygon {
 }
 
 /// `1/2 sum_i (v_i - v_0) x (v_i+1 - v_0)`: the normal, as long as the area.
-fn vector_area(vertices: &[Vec3]) -> Vec3 {
+pub(crate) fn vector_area(vertices: &[Vec3]) -> Vec3 {
     let Some((origin, rest)) = vertices.split_first() else {
         return Vec3::ZERO;
     };

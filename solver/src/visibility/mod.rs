@@ -8,6 +8,7 @@
 //! space. A surface that contains an end point (to within rounding) does not hide it.
 
 mod body;
+mod cover;
 
 use glam::{Vec2, Vec3};
 use heapless::Vec;
@@ -17,6 +18,7 @@ use crate::scene::Surface;
 
 pub(crate) use body::FACES;
 pub use body::{Body, bodies};
+pub use cover::covers;
 
 /// A surface that may hide something.
 #[derive(Clone, Copy, Debug)]
@@ -39,6 +41,9 @@ pub trait Visibility {
 
     /// Visits every surface that [`Shaft::admits`], in the order of their numbers.
     fn between<'v>(&'v self, shaft: &Shaft, visit: &mut impl FnMut(Obstacle<'v>));
+
+    /// Visits every surface that [`covers`] the surface of this number from the side to which `facing` points.
+    fn above(&self, _surface: u32, _facing: Vec3, _visit: &mut impl FnMut(&Polygon)) {}
 }
 
 /// Every surface of a scene, asked one after the other: work grows with their number.
@@ -58,6 +63,17 @@ impl Visibility for Occluders<'_> {
         for polygon in polygons.filter(|polygon| shaft.admits(polygon)) {
             let body = None;
             visit(Obstacle { polygon, body });
+        }
+    }
+
+    fn above(&self, surface: u32, facing: Vec3, visit: &mut impl FnMut(&Polygon)) {
+        let Some(bottom) = self.0.get(surface as usize) else {
+            return;
+        };
+        for (number, top) in (0..).zip(self.0) {
+            if covers((number, top), (surface, bottom), facing) {
+                visit(top.polygon());
+            }
         }
     }
 }
@@ -86,6 +102,10 @@ impl Visibility for OccludersAndBodies<'_> {
                 visit(Obstacle { polygon, body });
             }
         }
+    }
+
+    fn above(&self, surface: u32, facing: Vec3, visit: &mut impl FnMut(&Polygon)) {
+        Occluders(self.surfaces).above(surface, facing, visit);
     }
 }
 

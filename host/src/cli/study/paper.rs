@@ -1,6 +1,6 @@
 //! `relume study paper`: writes a table for each of the papers' tables, and two charts.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::Result;
 use serde_json::{Map, Value, json};
@@ -15,8 +15,7 @@ use crate::study::paper::{self, Report, large};
 const REPEATS: usize = 9;
 
 pub fn run(folder: &Path) -> Result<Value> {
-    let data =
-        std::env::var_os("RELUME_DATA").map_or_else(|| "../shared/data".into(), PathBuf::from);
+    let data = super::data();
     let report = paper::run(&data, REPEATS, |what| tell!("measuring: {what}"))?;
     if report.large.len() < large::PAIRS.len() {
         tell!(

@@ -263,11 +263,11 @@ impl<F: RowFiller> RowFiller for Logged<'_, F> {
         self.filler.luminaire(mesh, luminaire, far, row);
     }
 
-    fn shooter(&self, mesh: &Mesh, shooter: &Polygon, row: &mut [f32]) {
+    fn shooter(&self, mesh: &Mesh, shooter: &Shooter, row: &mut [f32]) {
         let start = Instant::now();
         self.filler.shooter(mesh, shooter, row);
         self.log.time.set(self.log.time.get() + start.elapsed());
-        self.log.shooters.borrow_mut().push(*shooter);
+        self.log.shooters.borrow_mut().push(*shooter.polygon());
     }
 
     fn estimate(&self, mesh: &Mesh, shooter: &Polygon, row: &mut [f32]) {

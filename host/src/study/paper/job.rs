@@ -8,7 +8,6 @@
 use anyhow::Result;
 use glam::Vec2;
 use relume::form_factor::Shooter;
-use relume::geometry::Polygon;
 use relume::mesh::{Element, Mesh};
 use relume::scene::Luminaire;
 use relume::visibility::Visibility;
@@ -197,8 +196,7 @@ impl RowFiller for Fine<'_> {
         Parallel::new(mesh, self.0).luminaire(mesh, luminaire, far, row);
     }
 
-    fn shooter(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
-        let shooter = Shooter::new(*polygon);
+    fn shooter(&self, mesh: &Mesh, shooter: &Shooter, row: &mut [f32]) {
         for (factor, element) in row.iter_mut().zip(mesh.elements) {
             let parts = parts(element);
             let factors = parts.filter_map(|part| {

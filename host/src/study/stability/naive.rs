@@ -1,7 +1,7 @@
 //! Rows as others fill them.
 
 use glam::Vec3;
-use relume::form_factor::point_to_polygon;
+use relume::form_factor::{Shooter, point_to_polygon};
 use relume::geometry::Polygon;
 use relume::luminaire;
 use relume::mesh::Mesh;
@@ -42,7 +42,8 @@ impl<V: Visibility> RowFiller for Kernel<'_, V> {
         luminaire::fill(mesh, luminaire, far, 0, self.visibility, row);
     }
 
-    fn shooter(&self, mesh: &Mesh, shooter: &Polygon, row: &mut [f32]) {
+    fn shooter(&self, mesh: &Mesh, shooter: &Shooter, row: &mut [f32]) {
+        let shooter = shooter.polygon();
         row.fill(0.0);
         for (factor, element) in row.iter_mut().zip(mesh.elements) {
             let Some(receiver) = mesh.element_polygon(element) else {

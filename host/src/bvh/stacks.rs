@@ -1,0 +1,58 @@
+//! Surfaces that lie on top of others, in their planes ([`covers`]): few, and found once.
+
+use glam::Vec3;
+use obvhs::Boundable;
+use obvhs::bvh2::Bvh2;
+use relume::geometry::Polygon;
+use relume::scene::Surface;
+use relume::visibility::covers;
+
+use super::{Bounded, visit_leaves};
+
+/// One surface on top of another one.
+struct Stack {
+    bottom: u32,
+    /// The side from which it is.
+    facing: Vec3,
+    top: Polygon,
+}
+
+/// All of them, by the number of the one below.
+pub(super) struct Stacks(Vec<Stack>);
+
+impl Stacks {
+    /// Finds them, in the order of the surfaces; `tree` holds these.
+    pub(super) fn new(surfaces: &[Surface], tree: &Bvh2) -> Self {
+        let mut stacks = Vec::new();
+        for (bottom, number) in surfaces.iter().zip(0..) {
+            let bounds = Bounded::new(bottom.polygon(), 0.0).aabb();
+            let mut near = Vec::new();
+            visit_leaves(
+                tree,
+                |node| !node.intersect_aabb(&bounds),
+                |leaf| near.extend(tree.primitive_indices[leaf].iter().copied()),
+            );
+            near.sort_unstable();
+            let normal = bottom.polygon().normal();
+            for facing in [normal, -normal] {
+                let tops = near.iter().map(|top| (*top, &surfaces[*top as usize]));
+                let tops = tops.filter(|top| covers(*top, (number, bottom), facing));
+                stacks.extend(tops.map(|(_, top)| Stack {
+                    bottom: number,
+                    facing,
+                    top: *top.polygon(),
+                }));
+            }
+        }
+        Self(stacks)
+    }
+
+    /// What lies on a surface, seen from a side.
+    pub(super) fn above(&self, surface: u32, facing: Vec3) -> impl Iterator<Item = &Polygon> {
+        let first = self.0.partition_point(|stack| stack.bottom < surface);
+        let own = self.0[first..].iter();
+        own.take_while(move |stack| stack.bottom == surface)
+            .filter(move |stack| stack.facing.dot(facing) > 0.0)
+            .map(|stack| &stack.top)
+    }
+}
