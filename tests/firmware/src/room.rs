@@ -30,7 +30,7 @@ pub struct Memory {
 
 impl Memory {
     /// Empty memory.
-    #[expect(clippy::new_without_default, reason = "it is for statics")]
+    #[allow(clippy::new_without_default, reason = "it is for statics")]
     pub const fn new() -> Self {
         Self {
             mesh: MeshStorage::new(),
