@@ -4,7 +4,7 @@
 # Debian's compiler, which comes with the sources of core, builds it; rustup's rust-lld links.
 #
 # With `--check` after the triple nothing is installed: the status tells whether the target can be built.
-# With `all` instead of a triple, as root: installs the compiler, the emulator and the C toolchain.
+# With `all` instead of a triple, as root: installs the compiler, the emulator, the C toolchain and node.
 target="${1:?a target triple, or all}"
 
 relume_debian_rust() { [ -x /usr/bin/rustc ] && [ -d /usr/lib/rustlib/src/rust ]; }
@@ -14,8 +14,8 @@ relume_install() {
 }
 
 if [ "$target" = all ]; then
-    relume_install qemu-system-arm binutils-arm-none-eabi gcc-arm-none-eabi libnewlib-arm-none-eabi
-    relume_debian_rust || rustup target add thumbv6m-none-eabi thumbv7m-none-eabi thumbv7em-none-eabihf ||
+    relume_install qemu-system-arm binutils-arm-none-eabi gcc-arm-none-eabi libnewlib-arm-none-eabi nodejs
+    relume_debian_rust || rustup target add thumbv6m-none-eabi thumbv7m-none-eabi thumbv7em-none-eabihf wasm32-unknown-unknown ||
         relume_install rustc-web rust-web-src
 elif rustup target list --installed 2>/dev/null | grep -qx "$target"; then
     :

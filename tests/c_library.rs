@@ -26,9 +26,6 @@ use serde_json::{Value, json};
 /// The light that is changed, as in the images of `tests/firmware`.
 const CHANGED: usize = 1;
 
-/// What is installed with one command of apt.
-const ARM: &str = "gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm";
-
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
@@ -53,39 +50,29 @@ fn output(command: &mut Command) -> String {
 }
 
 /// Whether these programs and the compiler's target are there; where not, the test fails in CI and says so elsewhere.
-fn is_installed(what: &str, programs: &[&str], target: &str, packages: &str) -> bool {
-    let is_there = |program: &&&str| {
-        let mut look = Command::new("sh");
-        look.args(["-c", &format!("command -v {program}")]);
+fn is_installed(what: &str, programs: &[&str], target: &str) -> bool {
+    let works = |script: &str| {
+        let mut look = Command::new("bash");
+        look.current_dir(root()).args(["-c", script]);
         look.output().is_ok_and(|found| found.status.success())
     };
-    let mut missing: Vec<String> = programs
-        .iter()
-        .filter(|program| !is_there(program))
-        .map(ToString::to_string)
+    let programs = programs.iter();
+    let mut missing: Vec<&str> = programs
+        .copied()
+        .filter(|program| !works(&format!("command -v {program}")))
         .collect();
-    let rustup = Command::new("rustup")
-        .args(["target", "list", "--installed"])
-        .output();
-    let has_target =
-        rustup.is_ok_and(|list| String::from_utf8_lossy(&list.stdout).contains(target));
-    if !has_target && !Path::new("/usr/lib/rustlib/src").exists() {
-        missing.push(format!("Rust for {target}"));
+    if !works(&format!("source .ci/bare-metal.sh {target} --check")) {
+        missing.push(target);
     }
-    if missing.is_empty() || std::env::var_os("CI").is_some() {
-        assert!(
-            missing.is_empty(),
-            "{what} needs {}: {packages}",
-            missing.join(", ")
-        );
+    if missing.is_empty() {
         return true;
     }
-    // Not by a macro, whose output a passing test would swallow.
-    let missing = missing.join(", ");
-    let _ = writeln!(
-        std::io::stderr(),
-        "NOT RUN: {what}, for lack of {missing}; `rustup target add {target}` and {packages}"
+    let told = format!(
+        "{what} was not run; missing: {missing:?}. Install all with: bash .ci/bare-metal.sh all"
     );
+    assert!(std::env::var_os("CI").is_none(), "{told}");
+    // Not by a macro, whose output a passing test would swallow.
+    let _ = writeln!(std::io::stderr(), "\nSKIPPED: {told}\n");
     false
 }
 
@@ -393,8 +380,7 @@ const M0: Board = Board {
 impl Board {
     fn run(&self, what: &str) {
         let programs = ["arm-none-eabi-gcc", "arm-none-eabi-nm", "qemu-system-arm"];
-        let packages = format!("`apt-get install {ARM}`");
-        if !is_installed(what, &programs, self.target, &packages) {
+        if !is_installed(what, &programs, self.target) {
             return;
         }
         let library = library(self.target).join("librelume_c.a");
@@ -493,8 +479,7 @@ fn a_c_program_relights_on_a_cortex_m0() {
 #[test]
 fn javascript_relights_by_web_assembly() {
     let target = "wasm32-unknown-unknown";
-    let packages = "`apt-get install nodejs`";
-    if !is_installed("the library in WebAssembly", &["node"], target, packages) {
+    if !is_installed("the library in WebAssembly", &["node"], target) {
         return;
     }
     let library = library(target).join("relume_c.wasm");

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::{env, fs, iter};
 
-use inputs::{Input, hash, inputs, write_if_new};
+use inputs::device_room::{Memory, POLYGONS, Polygon, bake};
+use inputs::{Input, hash, inputs, room_polygons, write_if_new};
 use relume::atlas::Atlas;
 use relume_host::device_cost::{Core, DeviceCost};
 use serde_json::{Value, json};
@@ -219,6 +220,38 @@ fn every_frame_is_within_a_step_of_the_float_one() {
             assert!(apart <= 1, "{}: {apart} steps", input.name);
         }
     }
+}
+
+#[test]
+fn the_m4f_bakes_the_papers_room() {
+    if !has_tools() {
+        return;
+    }
+    let data = work().join("data");
+    fs::create_dir_all(&data).expect("a folder that can be written to");
+    let polygons = room_polygons();
+    write_if_new(&data.join("room.rs"), format!("{polygons:?}").as_bytes());
+    let polygons: [Polygon; POLYGONS] = polygons.try_into().expect("as many");
+    let mut flash = vec![0; 9_000];
+    let here = bake(&polygons, &mut Box::new(Memory::new()), &mut flash).expect("it fits");
+
+    let built = build(TARGETS[2], &["bake"], "");
+    let told = String::from_utf8_lossy(&built.stderr);
+    assert!(built.status.success(), "{told}");
+    let (status, text) = emulate(TARGETS[2], "bake");
+    assert_eq!(status, Some(0), "{text}");
+    eprintln!("{text}");
+    assert_eq!(said(&text, "rows"), Some(here.rows));
+    assert_eq!(said(&text, "contributions"), Some(here.contributions));
+    let atlas = flash[..here.length].iter();
+    let atlas = atlas.fold(0x811c_9dc5_u32, |hash, byte| {
+        (hash ^ u32::from(*byte)).wrapping_mul(0x0100_0193)
+    });
+    assert_eq!(said(&text, "atlas"), Some(atlas));
+    let [_, statics] = size(&image(TARGETS[2], "bake"));
+    let ram = statics + u64::from(said(&text, "stack").expect("it says"));
+    eprintln!("RAM: {ram}");
+    assert!(ram <= 192 << 10, "{ram} bytes of RAM");
 }
 
 #[test]

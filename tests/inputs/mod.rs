@@ -20,6 +20,9 @@ use relume_host::pack::{Format, Packing, pack};
 use relume_host::scene::OwnedScene;
 use relume_host::solution::Solution;
 
+#[path = "../firmware/src/room.rs"]
+pub mod device_room;
+
 /// As in the images.
 pub static TONE: Rgb565Table = Rgb565Table::new(1024);
 
@@ -50,8 +53,7 @@ fn solved(scene: &OwnedScene) -> Solution {
         variation: f64::INFINITY,
         ..Settings::default()
     };
-    let go_on = &mut |_: _| ControlFlow::Continue(());
-    bake(scene, &settings, go_on).expect("a legal scene")
+    bake(scene, &settings, &mut |_| ControlFlow::Continue(())).expect("a legal scene")
 }
 
 /// The four inputs.
@@ -245,6 +247,20 @@ impl Input {
         write_if_new(&path, &self.atlas);
         write_if_new(&path.with_extension("rs"), text.as_bytes());
     }
+}
+
+/// The paper's room with three lamps: what `room` of the firmware bakes.
+pub fn room_polygons() -> Vec<device_room::Polygon> {
+    let room = paper_room(PaperLamps::Three).expect("a legal scene");
+    let polygon = |surface: &relume::scene::Surface| {
+        let mut vertices = [[0.0; 3]; 4];
+        for (to, from) in vertices.iter_mut().zip(surface.polygon().vertices()) {
+            *to = from.to_array();
+        }
+        let reflectance = surface.reflectance().get().to_array();
+        (vertices, reflectance, surface.emission().map(|e| e.light))
+    };
+    room.scene.surfaces.iter().map(polygon).collect()
 }
 
 /// Leaves a file alone that holds just this, so that nothing is built again.

@@ -7,9 +7,9 @@ use relume::atlas::Quantity;
 use relume::code::Code;
 use relume_host::bake::{Settings, bake};
 use relume_host::builtin::{Builtin, flat};
-use relume_host::export::light_layers::{contributions, layers};
+use relume_host::export::light_layers::contributions;
 use relume_host::pack::{Format, pack};
-use relume_host::preview::{Camera, Viewpoint};
+use relume_host::preview::{Camera, Viewpoint, light_layers};
 use relume_panel::{BRIGHTEST, EXPOSURE, PICTURE};
 
 /// Bakes the flat and packs its picture.
@@ -32,7 +32,7 @@ pub fn atlas() -> Result<Vec<u8>> {
         fov: camera.fov,
     };
     let camera = Camera::new(viewpoint, PICTURE.size.width, PICTURE.size.height)?;
-    let mut layers = layers(&solution, &camera, f32::INFINITY)?;
+    let mut layers = light_layers(&solution, &camera)?;
     for (_, layer) in &mut layers {
         layer
             .pixels

@@ -19,11 +19,11 @@ use super::{Outcome, human_bytes, tell, write_file};
 use crate::bake::{Settings, bake_keeping};
 use crate::builtin::{Builtin, cornell_box};
 use crate::display_error::{Mixed, Solo, max_codes};
-use crate::export::{exr, light_layers};
+use crate::export::exr;
 use crate::mix::{Setting, mix};
 use crate::pack::{Aim, Choice, Packing, PackingError, Request, choose, relight_atlas};
 use crate::picture::{self, Exposure, LinearImage, Tile, error_map, sheet};
-use crate::preview::{Camera, Relit, Viewpoint, render, show};
+use crate::preview::{Camera, Relit, Viewpoint, light_layers, render, show};
 use crate::solution::{self, Solution};
 
 /// Where everything goes.
@@ -277,7 +277,7 @@ fn pictures(stage: &Stage, folder: &mut Folder) -> Result<Vec<Relighting>> {
 
 /// One linear layer per light at nominal emission, and the picture of all together.
 fn write_layers(stage: &Stage, folder: &mut Folder) -> Result<()> {
-    let layers = light_layers::layers(stage.solution, &stage.camera, f32::INFINITY)?;
+    let layers = light_layers(stage.solution, &stage.camera)?;
     folder.write("lights.exr", &exr::encode_light_layers(&layers)?)?;
     let nominal = stage.solution.nominal_mix();
     let all_on = stage.image(&stage.solution.relight(&nominal), &nominal)?;

@@ -11,34 +11,7 @@ use relume::mesh::Spacing;
 
 use super::exr::LightLayer;
 use crate::mesh::OwnedMesh;
-use crate::preview::{Camera, PreviewError, Relit, render};
 use crate::solution::{Method, Solution, SolutionLight};
-
-/// Layers of a baked scene: for every light the picture that it makes alone, at its nominal emission, cut to
-/// `brightest` as [`render`] does.
-///
-/// # Errors
-/// None in fact: a solution relights all of its elements.
-pub fn layers(
-    solution: &Solution,
-    camera: &Camera,
-    brightest: f32,
-) -> Result<Vec<LightLayer>, PreviewError> {
-    let nominal = solution.nominal_mix();
-    let layer = |(light, tag): (&SolutionLight, usize)| {
-        let mut only = vec![Rgb::BLACK; nominal.len()];
-        only[tag] = nominal[tag];
-        let relit = Relit {
-            mesh: solution.mesh.view(),
-            surfaces: &solution.surfaces,
-            irradiance: &solution.relight(&only),
-            exitance: &solution.face_exitance(&only),
-            gathered: None,
-        };
-        Ok((light.name.clone(), render(&relit, camera, brightest)?))
-    };
-    solution.lights.iter().zip(0..).map(layer).collect()
-}
 
 /// Contributions whose elements are pixels, row by row from the top, and how many values were no light.
 ///

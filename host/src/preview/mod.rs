@@ -12,6 +12,7 @@
 
 mod camera;
 mod fit;
+mod layers;
 mod raster;
 mod shading;
 #[cfg(test)]
@@ -26,6 +27,7 @@ use relume::mesh::{Mesh, Side};
 use tiny_skia::Pixmap;
 
 pub use camera::{Camera, CameraError, MAX_SIDE, Viewpoint};
+pub use layers::light_layers;
 
 use crate::picture::{Exposure, LinearImage, PictureError, to_pixmap};
 use crate::probe::{Gatherer, Part};

@@ -293,7 +293,7 @@ pub const fn srgb_linear(units: u32) -> u32 {
     // The index is below the last of 256 entries.
     #[allow(clippy::indexing_slicing)]
     let (low, high) = (SRGB[index as usize], SRGB[index as usize + 1]);
-    low + ((high - low) as u64 * rest as u64 >> 12) as u32
+    low + (((high - low) as u64 * rest as u64) >> 12) as u32
 }
 
 /// `2^(octave + fraction 2^-23 + begin)`.

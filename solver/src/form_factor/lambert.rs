@@ -14,7 +14,7 @@ use glam::Vec3;
 use heapless::Vec;
 
 use super::lanes::{Numbers, Vectors};
-use crate::geometry::{Clipped, clip};
+use crate::geometry::{Clipped, as_many, clip};
 use crate::math;
 
 /// Most corners that pieces of a polygon may have.
@@ -28,9 +28,9 @@ pub(super) type Outline = Vec<Vectors, CORNERS>;
 /// In [0, 1]; 0 for a point behind the polygon or in its plane.
 #[must_use]
 pub fn point_to_polygon(point: Vec3, normal: Vec3, outline: &[Vec3]) -> f32 {
-    let relative: Clipped = outline.iter().map(|v| *v - point).take(7).collect();
+    let relative: Clipped = as_many(outline.iter().map(|v| *v - point).take(7));
     let above = clip(&relative, |v| v.dot(normal));
-    let seen: Outline = above.iter().map(|v| Vectors::all(*v)).collect();
+    let seen: Outline = as_many(above.iter().map(|v| Vectors::all(*v)));
     let Numbers([factor, ..]) = lambert(normal, &seen);
     factor.clamp(0.0, 1.0)
 }

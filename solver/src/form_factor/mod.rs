@@ -22,7 +22,7 @@ mod visible;
 use glam::{Vec2, Vec3};
 use heapless::Vec;
 
-use crate::geometry::{Polygon, SamplePoint, from_unit_square};
+use crate::geometry::{Polygon, SamplePoint, as_many, from_unit_square};
 use crate::mesh::{Element, Mesh};
 use crate::visibility::{Shaft, Visibility};
 
@@ -51,17 +51,15 @@ impl Shooter {
     #[must_use]
     pub fn new(polygon: Polygon) -> Self {
         let set = |offset: Vec2| {
-            [(0.0, 0.0), (2.0, 0.0), (0.0, 2.0), (2.0, 2.0)]
-                .into_iter()
-                .map(|(s, t)| {
-                    let at = (Vec2::new(s, t) + offset + 0.5) / 4.0;
-                    let (position, density) = from_unit_square(&polygon, at);
-                    SamplePoint {
-                        position,
-                        weight: density / 16.0,
-                    }
-                })
-                .collect()
+            let places = [(0.0, 0.0), (2.0, 0.0), (0.0, 2.0), (2.0, 2.0)];
+            as_many(places.into_iter().map(|(s, t)| {
+                let at = (Vec2::new(s, t) + offset + 0.5) / 4.0;
+                let (position, density) = from_unit_square(&polygon, at);
+                SamplePoint {
+                    position,
+                    weight: density / 16.0,
+                }
+            }))
         };
         Self {
             polygon,

@@ -10,7 +10,7 @@ use super::lambert::{Outline, lambert};
 use super::lanes::{Numbers, Vectors};
 use super::visible::{Blocker, Hides, Points, hides, visible_factors};
 use super::{BLOCKERS, Shooter};
-use crate::geometry::{Plane, Polygon, SamplePoint, clip, gauss_points};
+use crate::geometry::{Plane, Polygon, SamplePoint, as_many, clip, gauss_points};
 use crate::visibility::{Body, Obstacle, Shaft, Visibility};
 
 /// An element with the points that stand for it.
@@ -121,13 +121,13 @@ impl<'s> View<'s> {
     ) -> Self {
         let Plane { origin, normal, .. } = plane;
         let vertices = shooter.polygon.vertices().iter();
-        let relative: Vec<Vec3, 4> = vertices.map(|v| *v - origin).collect();
+        let relative: Vec<Vec3, 4> = as_many(vertices.map(|v| *v - origin));
         let above = clip(&relative, |v| v.dot(normal));
         let mut view = Self {
             shooter,
             normal,
             origin,
-            outline: above.iter().copied().take(6).collect(),
+            outline: as_many(above.iter().copied()),
             blockers: Vec::new(),
             is_exact: true,
         };
@@ -248,7 +248,7 @@ impl<'s> View<'s> {
 
     fn open(&self, points: &Points) -> Numbers {
         let seen = self.outline.iter();
-        let seen: Outline = seen.map(|v| Vectors::all(*v) - points.relative).collect();
+        let seen: Outline = as_many(seen.map(|v| Vectors::all(*v) - points.relative));
         lambert(self.normal, &seen)
     }
 
@@ -265,7 +265,7 @@ impl<'s> View<'s> {
     pub(super) fn at_point(&self, point: Vec3, visibility: &impl Visibility) -> f32 {
         self.exact_at_point(point).unwrap_or_else(|| {
             let samples = self.shooter.samples.iter().flatten().copied();
-            let samples: Vec<SamplePoint, 16> = samples.collect();
+            let samples: Vec<SamplePoint, 16> = as_many(samples);
             self.sampled(point, &samples, visibility).min(1.0)
         })
     }

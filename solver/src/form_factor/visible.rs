@@ -21,7 +21,7 @@ use heapless::Vec;
 
 use super::lambert::{CORNERS, Outline, lambert};
 use super::lanes::{ALL, Mask, Numbers, Vectors};
-use crate::geometry::{Plane, Polygon};
+use crate::geometry::{Plane, Polygon, as_many};
 use crate::visibility::{Body, FACES};
 
 /// Most cones that may overlap at a place.
@@ -285,7 +285,7 @@ pub(super) enum Hides {
 /// point: where it is the same at four corners, it is so between them.
 pub(super) fn hides(blocker: &Blocker, corners: &Points, outline: &[Vec3]) -> Hides {
     let seen = outline.iter().map(|v| Vectors::all(*v) - corners.relative);
-    let piece: Outline = seen.collect();
+    let piece: Outline = as_many(seen);
     let mut cones = Cones::new();
     let is_seen_alike = |plane: &Plane| {
         let (height, tolerance) = corners.height(plane);
@@ -329,7 +329,7 @@ pub(super) fn visible_factors(
     blockers: &[Blocker],
 ) -> Option<Numbers> {
     let seen = outline.iter().map(|v| Vectors::all(*v) - points.relative);
-    let piece: Outline = seen.collect();
+    let piece: Outline = as_many(seen);
     let mut cones = Cones::new();
     let (mut lit, mut cuts) = (ALL, Vec::new());
     for blocker in blockers {

@@ -14,6 +14,7 @@ use glam::{Vec2, Vec3};
 use heapless::Vec;
 
 pub use error::PolygonError;
+pub(crate) use sample::as_many;
 pub use sample::{SamplePoint, from_unit_square, gauss_points};
 
 /// Most vertices that a polygon may have.

@@ -39,13 +39,21 @@ pub fn gauss_points(polygon: &Polygon) -> Vec<SamplePoint, 4> {
         &QUAD
     };
     let total: f32 = parameters.iter().map(|at| polygon.density(*at)).sum();
-    parameters
-        .iter()
-        .map(|at| SamplePoint {
-            position: polygon.point(*at),
-            weight: polygon.density(*at) / total,
-        })
-        .collect()
+    as_many(parameters.iter().map(|at| SamplePoint {
+        position: polygon.point(*at),
+        weight: polygon.density(*at) / total,
+    }))
+}
+
+/// As many items as fit; unlike collecting them, this leaves no panic path in a device.
+pub(crate) fn as_many<T, const N: usize>(items: impl Iterator<Item = T>) -> Vec<T, N> {
+    let mut kept = Vec::new();
+    for item in items {
+        if kept.push(item).is_err() {
+            break;
+        }
+    }
+    kept
 }
 
 /// Maps the unit square to the polygon so that equal areas stay equal on triangles and

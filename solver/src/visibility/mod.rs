@@ -13,7 +13,7 @@ mod cover;
 use glam::{Vec2, Vec3};
 use heapless::Vec;
 
-use crate::geometry::{Plane, Polygon};
+use crate::geometry::{Plane, Polygon, as_many};
 use crate::scene::Surface;
 
 pub(crate) use body::FACES;
@@ -235,9 +235,9 @@ impl Shaft {
         let ends = receiver.iter().chain(shooter.vertices());
         Self {
             planes: [plane, shooter.plane()],
-            ends: ends.copied().take(8).collect(),
+            ends: as_many(ends.copied()),
             around: a.with(b),
-            walls: walls.collect(),
+            walls: as_many(walls),
         }
     }
 

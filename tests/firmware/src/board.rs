@@ -72,6 +72,25 @@ pub fn ticks() -> u32 {
 #[cfg(not(small))]
 const TICKS: u64 = 25_600_000;
 
+/// Starts the slow timer.
+#[cfg(not(small))]
+pub fn start_slow_timer() {
+    // CMSDK dual timer: off, load; then on, free-running, a 256th of the clock, 32 bits.
+    write(0x4000_2008, 0);
+    write(0x4000_2000, u32::MAX);
+    write(0x4000_2008, 0x8a);
+}
+
+/// Slow ticks since the start.
+#[cfg(not(small))]
+pub fn slow_ticks() -> u32 {
+    u32::MAX - read(0x4000_2004)
+}
+
+/// Slow ticks in a thousand instructions of 1.024 us: 25 MHz / 256.
+#[cfg(not(small))]
+pub const SLOW_TICKS: u32 = 100;
+
 /// Starts the timer.
 #[cfg(small)]
 pub fn start_timer() {

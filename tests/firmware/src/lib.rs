@@ -14,7 +14,12 @@ pub mod kernels;
 #[cfg(target_os = "none")]
 mod measure;
 
+pub mod room;
+
 #[cfg(target_os = "none")]
 pub use board::{exit, instructions, say};
 #[cfg(target_os = "none")]
-pub use measure::{Lent, count, hash, largest_stack, paint_stack};
+#[cfg(all(target_os = "none", not(small)))]
+pub use measure::long_count;
+#[cfg(target_os = "none")]
+pub use measure::{Lent, count, hash, hash_bytes, largest_stack, paint_stack};

@@ -3,6 +3,8 @@
 use core::cell::UnsafeCell;
 use core::hint::black_box;
 
+#[cfg(not(small))]
+use crate::board::{SLOW_TICKS, slow_ticks, start_slow_timer};
 use crate::board::{instructions, start_timer, ticks};
 
 /// Instructions that `f` takes, without those of reading the timer.
@@ -18,9 +20,22 @@ pub fn count(f: impl FnOnce()) -> u32 {
     instructions(after - empty) - instructions(empty - before)
 }
 
+/// Thousands of instructions that `f` takes, however many.
+#[cfg(not(small))]
+pub fn long_count(f: impl FnOnce()) -> u32 {
+    start_slow_timer();
+    let before = slow_ticks();
+    f();
+    (slow_ticks() - before) / SLOW_TICKS
+}
+
 /// FNV-1a, 32 bits, of the bytes of pixels, low byte first.
 pub fn hash(pixels: &[u16]) -> u32 {
-    let bytes = pixels.iter().flat_map(|pixel| pixel.to_le_bytes());
+    hash_bytes(pixels.iter().flat_map(|pixel| pixel.to_le_bytes()))
+}
+
+/// FNV-1a, 32 bits.
+pub fn hash_bytes(bytes: impl Iterator<Item = u8>) -> u32 {
     bytes.fold(0x811c_9dc5, |hash, byte| {
         (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
     })
