@@ -29,8 +29,7 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// Empty memory.
-    #[expect(clippy::new_without_default, reason = "it is for statics")]
+    /// Empty memory, for a static.
     pub const fn new() -> Self {
         Self {
             mesh: MeshStorage::new(),
