@@ -38,11 +38,11 @@ pub mod mix;
 
 pub mod probe;
 
+pub mod preview;
+
 pub mod export;
 
 pub mod device_cost;
-
-pub mod preview;
 
 pub mod polygon_pair;
 

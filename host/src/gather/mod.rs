@@ -284,7 +284,7 @@ impl Hits {
         self.passes.push(hits);
     }
 
-    /// The share of every element that light can reach, from [`LEAST_EXPOSED`] to 1.
+    /// The share of every element that light can reach, from a quarter to 1.
     #[must_use]
     pub fn exposed(&self, elements: usize) -> Vec<f32> {
         let per_pass = RAYS_PER_PASS as usize;
