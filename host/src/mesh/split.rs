@@ -7,14 +7,20 @@
 //! `v_pm = sum_{j in p} A_j (rho_j (D_jm - <D_m>))^2 / sum_j A_j (rho_j D_jm)^2`
 //!
 //! Again and again the light with the largest `v_m = sum_p v_pm` has its largest patch halved, between
-//! elements, until `v_m <= tolerance^2` for all of them or the budget of patches is used up.
+//! elements, until `v_m <= tolerance^2` for all of them or the budget of patches is used up. Symmetric rooms have lights,
+//! patches and halves that are equal but for rounding: these go together, and a patch of equal halves both ways is
+//! quartered, so that where a polygon begins changes nothing.
 //! Patches that emit stay whole; those of triangles are divided into their elements at once.
 
 use std::ops::Range;
+use std::slice;
 
 use relume::mesh::{Element, Patch};
 
 use super::OwnedMesh;
+
+/// Variations that differ by no more are equal.
+const EQUAL: f64 = 1e-3;
 
 /// Direct irradiance of every element by every light, element by element, W/m2 at unit emission.
 #[derive(Clone, Copy, Debug)]
@@ -47,11 +53,16 @@ pub struct Split {
 pub fn split(mesh: &OwnedMesh, direct: Direct, tolerance: f64, budget: usize) -> Split {
     let mut division = Division::new(mesh, direct);
     while division.parts.len() < budget {
-        let Some((light, variation)) = division.worst() else {
+        let worst = division.worst();
+        let largest = division.largest(worst);
+        if worst <= tolerance * tolerance || largest.is_empty() {
             break;
-        };
-        if variation <= tolerance * tolerance || !division.halve_largest(light) {
-            break;
+        }
+        // From the last on, so that the numbers of the others stay.
+        for (part, light) in largest.into_iter().rev() {
+            if division.parts.len() < budget {
+                division.halve(part, light);
+            }
         }
     }
     division.finish()
@@ -159,25 +170,34 @@ impl<'a> Division<'a> {
         self.parts.push(part);
     }
 
-    /// The light with the largest variation.
-    fn worst(&self) -> Option<(usize, f64)> {
-        let totals = self.totals.iter().copied().enumerate();
-        totals.max_by(|a, b| a.1.total_cmp(&b.1))
+    /// The largest `v_m`.
+    fn worst(&self) -> f64 {
+        self.totals.iter().copied().fold(0.0, f64::max)
     }
 
-    /// Halves the part with the largest variation of a light; false when there is none.
-    fn halve_largest(&mut self, light: usize) -> bool {
-        let variations = self.parts.iter().map(|part| part.variation[light]);
-        let largest = variations.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((index, variation)) = largest.filter(|(_, variation)| *variation > 0.0) else {
-            return false;
-        };
+    /// The parts with the largest variation of the lights that vary like the worst, each with such a light.
+    fn largest(&self, worst: f64) -> Vec<(usize, usize)> {
+        let varies = |value: f64, largest: f64| value > 0.0 && value >= largest * (1.0 - EQUAL);
+        let lights = (0..self.direct.lights).filter(|light| varies(self.totals[*light], worst));
+        let mut found = Vec::new();
+        for light in lights {
+            let variations = self.parts.iter().map(|part| part.variation[light]);
+            let largest = variations.clone().fold(0.0, f64::max);
+            let parts = variations.enumerate().filter(|(_, v)| varies(*v, largest));
+            found.extend(parts.map(|(part, _)| (part, light)));
+        }
+        found.sort_unstable();
+        found.dedup_by_key(|(part, _)| *part);
+        found
+    }
+
+    fn halve(&mut self, index: usize, light: usize) {
         let part = &self.parts[index];
         if part.columns.len() * part.rows.len() < 2 {
             // Rounding left something in a single element.
-            self.totals[light] -= variation;
+            self.totals[light] -= part.variation[light];
             self.parts[index].variation[light] = 0.0;
-            return true;
+            return;
         }
         let halves = self.halves(part, light);
         let part = self.parts.remove(index);
@@ -187,40 +207,42 @@ impl<'a> Division<'a> {
         for half in halves {
             self.add(half);
         }
-        true
     }
 
-    /// The two halves that vary least; all elements of a triangle.
+    /// The two halves that vary least, or four quarters; all elements of a triangle.
     fn halves(&self, part: &Part, light: usize) -> Vec<Part> {
-        let Part {
-            patch,
-            columns,
-            rows,
-            ..
-        } = part;
-        if self.grids[*patch as usize].is_triangle {
-            let elements = columns.clone();
-            return elements
-                .map(|column| self.part(*patch, column..column + 1, rows.clone()))
-                .collect();
+        let (patch, columns, rows) = (part.patch, &part.columns, &part.rows);
+        let blocks = |columns: &[Range<usize>], rows: &[Range<usize>]| -> Vec<Part> {
+            let block = |c: &Range<usize>, r: &Range<usize>| self.part(patch, c.clone(), r.clone());
+            rows.iter()
+                .flat_map(|row| columns.iter().map(move |column| block(column, row)))
+                .collect()
+        };
+        let halved = |range: &Range<usize>| {
+            let middle = range.start + range.len().div_ceil(2);
+            [range.start..middle, middle..range.end]
+        };
+        if self.grids[patch as usize].is_triangle {
+            let each: Vec<_> = columns.clone().map(|column| column..column + 1).collect();
+            return blocks(&each, slice::from_ref(rows));
         }
-        let middle = |range: &Range<usize>| range.start + range.len().div_ceil(2);
-        let across = (columns.len() > 1).then(|| {
-            let middle = middle(columns);
-            [columns.start..middle, middle..columns.end]
-                .map(|columns| self.part(*patch, columns, rows.clone()))
-        });
-        let along = (rows.len() > 1).then(|| {
-            let middle = middle(rows);
-            [rows.start..middle, middle..rows.end]
-                .map(|rows| self.part(*patch, columns.clone(), rows))
-        });
-        let left = |halves: &[Part; 2]| halves.iter().map(|h| h.variation[light]).sum::<f64>();
-        let best = across
-            .into_iter()
-            .chain(along)
-            .min_by(|a, b| left(a).total_cmp(&left(b)));
-        best.map(Vec::from).unwrap_or_default()
+        if rows.len() < 2 {
+            return blocks(&halved(columns), slice::from_ref(rows));
+        }
+        if columns.len() < 2 {
+            return blocks(slice::from_ref(columns), &halved(rows));
+        }
+        let across = blocks(&halved(columns), slice::from_ref(rows));
+        let along = blocks(slice::from_ref(columns), &halved(rows));
+        let left = |halves: &[Part]| halves.iter().map(|h| h.variation[light]).sum::<f64>();
+        let [left_across, left_along] = [left(&across), left(&along)];
+        if (left_across - left_along).abs() <= EQUAL * left_across.max(left_along) {
+            blocks(&halved(columns), &halved(rows))
+        } else if left_across < left_along {
+            across
+        } else {
+            along
+        }
     }
 
     /// The patch that a block of elements makes, the first at its one corner, the last at the other.
@@ -267,7 +289,7 @@ impl<'a> Division<'a> {
         Split {
             mesh,
             first,
-            variation: self.worst().map_or(0.0, |(_, v)| v.max(0.0).sqrt()),
+            variation: self.worst().sqrt(),
         }
     }
 }
