@@ -8,6 +8,7 @@ use std::ops::Range;
 
 use glam::Vec2;
 use rayon::prelude::*;
+use relume::color::Rgb;
 use relume::form_factor::{self, Receiver, Shooter, View};
 use relume::geometry::{Polygon, from_unit_square};
 use relume::luminaire;
@@ -84,6 +85,37 @@ pub fn close<const K: usize>(
         }
     });
     refinement.finish();
+}
+
+/// Direct irradiance of every element at unit emission by whole lamps and by luminaires, W/m2; element by element,
+/// light inside.
+#[must_use]
+pub fn direct(
+    filler: &impl RowFiller,
+    mesh: &Mesh,
+    luminaires: &[Luminaire],
+    far: f32,
+    lights: usize,
+) -> Vec<Rgb> {
+    let mut direct = vec![Rgb::BLACK; mesh.elements.len() * lights];
+    let mut row = vec![0.0; mesh.elements.len()];
+    let mut add = |light: u32, share: Rgb, row: &[f32]| {
+        let values = direct.iter_mut().skip(light as usize);
+        for (value, factor) in values.step_by(lights.max(1)).zip(row) {
+            *value += share * *factor;
+        }
+    };
+    for face in mesh.faces {
+        if let Some(emission) = face.emission {
+            filler.lamp(mesh, &face.polygon, &mut row);
+            add(emission.light, emission.share, &row);
+        }
+    }
+    for luminaire in luminaires {
+        filler.luminaire(mesh, luminaire, far, &mut row);
+        add(luminaire.light(), luminaire.share(), &row);
+    }
+    direct
 }
 
 /// What share of every element's view has no patches.

@@ -18,11 +18,10 @@ use relume::luminaire;
 use relume::mesh::{Element, Patch};
 use relume::scene::Scene;
 
-use super::direct::{self, Lamps};
 use crate::bvh::Bvh;
 use crate::gather::{Fan, Rays};
 use crate::mesh::{Locator, OwnedMesh, Place, spread};
-use crate::rows::{Parallel, RowFiller};
+use crate::rows::{self, Parallel};
 
 /// One place for so many elements, but not too few to be sure and not more than that takes.
 const ELEMENTS_PER_PLACE: usize = 8;
@@ -86,24 +85,13 @@ fn direct_light(scene: &Scene, mesh: &OwnedMesh, bvh: &Bvh, places: &[Place]) ->
     let receivers = with_patches_of_their_own(mesh, places);
     let view = receivers.view();
     let filler = Parallel::new(&view, bvh);
-    let mut light = vec![Rgb::BLACK; places.len() * lights];
-    let mut add = |tag: u32, share: Rgb, row: &[f32]| {
-        let values = light.iter_mut().skip(tag as usize).step_by(lights);
-        for (value, factor) in values.zip(row) {
-            *value += share * *factor;
-        }
-    };
-    let mut row = vec![0.0; places.len()];
-    let far = luminaire::far(scene);
-    for luminaire in scene.luminaires() {
-        filler.luminaire(&view, luminaire, far, &mut row);
-        add(luminaire.light(), luminaire.share(), &row);
-    }
-    for (_, lamp, emission) in direct::shooters(mesh, Lamps::Whole) {
-        filler.lamp(&view, &lamp, &mut row);
-        add(emission.light, emission.share, &row);
-    }
-    light
+    rows::direct(
+        &filler,
+        &view,
+        scene.luminaires(),
+        luminaire::far(scene),
+        lights,
+    )
 }
 
 /// A mesh whose elements are the places, each in a patch that is no larger.

@@ -7,7 +7,7 @@ use clap::Args;
 use glam::Vec3;
 use relume::color::Rgb;
 use relume::geometry::Polygon;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::load::{Loaded, load};
 use super::{Outcome, keep, output_path, tell, write_file};
@@ -17,6 +17,7 @@ use crate::mix::{Setting, mix};
 use crate::picture::{self, Exposure, LinearImage, to_pixmap};
 use crate::preview::{Camera, CameraError, Gathered, Relit, Viewpoint, render, show};
 use crate::probe::{Gatherer, MOST_RAYS};
+use crate::solution::SolutionLight;
 
 /// Rays that gather at a pixel by default.
 const RAYS: u32 = 256;
@@ -188,24 +189,47 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
         let (pixmap, factor) = show(&relit, &camera, arguments.exposure, BACKGROUND)?;
         (picture::encode_png(&pixmap)?, Some(factor))
     };
-    write_file(&output, &bytes)?;
-    let exposed = exposure.map_or("linear, unexposed".to_owned(), |e| format!("exposure {e}"));
-    tell!("{}: {width}x{height}, {exposed}", output.display());
-    Ok(Outcome::done(json!({
-        "file": output.display().to_string(),
-        "width": width,
-        "height": height,
-        "exposure": exposure,
-        "mix": solution.lights.iter().zip(&mix).map(|(light, weight)| {
-            json!({"name": light.name, "weight": weight.to_array()})
-        }).collect::<Vec<_>>(),
-        "camera": {
-            "eye": viewpoint.eye.to_array(),
-            "target": viewpoint.target.to_array(),
-            "up": viewpoint.up.to_array(),
-            "fov": viewpoint.fov,
-        },
-    })))
+    let picture = Picture {
+        size: [width, height],
+        exposure,
+        bytes,
+    };
+    let mut report = picture.write(&output, &solution.lights, &mix)?;
+    report["camera"] = json!({
+        "eye": viewpoint.eye.to_array(),
+        "target": viewpoint.target.to_array(),
+        "up": viewpoint.up.to_array(),
+        "fov": viewpoint.fov,
+    });
+    Ok(Outcome::done(report))
+}
+
+/// A picture as it is written.
+struct Picture {
+    size: [u32; 2],
+    /// `None` for linear light.
+    exposure: Option<f32>,
+    bytes: Vec<u8>,
+}
+
+impl Picture {
+    /// Writes it, and reports what it shows.
+    fn write(&self, output: &Path, lights: &[SolutionLight], mix: &[Rgb]) -> Result<Value> {
+        write_file(output, &self.bytes)?;
+        let [width, height] = self.size;
+        let exposed = self.exposure;
+        let exposed = exposed.map_or("linear, unexposed".to_owned(), |e| format!("exposure {e}"));
+        tell!("{}: {width}x{height}, {exposed}", output.display());
+        Ok(json!({
+            "file": output.display().to_string(),
+            "width": width,
+            "height": height,
+            "exposure": self.exposure,
+            "mix": lights.iter().zip(mix).map(|(light, weight)| {
+                json!({"name": light.name, "weight": weight.to_array()})
+            }).collect::<Vec<_>>(),
+        }))
+    }
 }
 
 /// A picture whose pixels are the elements: there is nothing to look for with a camera.
@@ -235,18 +259,12 @@ fn relight_picture(
         let pixmap = to_pixmap(&image, factor, BACKGROUND)?;
         (picture::encode_png(&pixmap)?, Some(factor))
     };
-    write_file(output, &bytes)?;
-    let exposed = exposure.map_or("linear, unexposed".to_owned(), |e| format!("exposure {e}"));
-    tell!("{}: {width}x{height}, {exposed}", output.display());
-    Ok(Outcome::done(json!({
-        "file": output.display().to_string(),
-        "width": width,
-        "height": height,
-        "exposure": exposure,
-        "mix": lights.iter().zip(&mix).map(|(light, weight)| {
-            json!({"name": light.name, "weight": weight.to_array()})
-        }).collect::<Vec<_>>(),
-    })))
+    let picture = Picture {
+        size: [width, height],
+        exposure,
+        bytes,
+    };
+    Ok(Outcome::done(picture.write(output, lights, &mix)?))
 }
 
 fn has_extension(path: &Path, extension: &str) -> bool {

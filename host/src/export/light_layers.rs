@@ -7,11 +7,9 @@
 //! are counted.
 
 use relume::color::Rgb;
-use relume::mesh::Spacing;
 
 use super::exr::LightLayer;
-use crate::mesh::OwnedMesh;
-use crate::solution::{Method, Solution, SolutionLight};
+use crate::solution::Solution;
 
 /// Contributions whose elements are pixels, row by row from the top, and how many values were no light.
 ///
@@ -33,29 +31,10 @@ pub fn contributions(layers: &[LightLayer]) -> (Solution, usize) {
             contributions.push(Rgb::from_array([r, g, b].map(&mut light_of)));
         }
     }
+    let lights = layers.iter().map(|(name, _)| (name.clone(), Rgb::WHITE));
     let solution = Solution {
-        surfaces: Vec::new(),
-        luminaires: Vec::new(),
-        mesh: OwnedMesh::default(),
         image: size,
-        lights: layers
-            .iter()
-            .map(|(name, _)| SolutionLight {
-                name: name.clone(),
-                emission: Rgb::WHITE,
-                residual: f32::NAN,
-                error: f32::NAN,
-            })
-            .collect(),
-        contributions,
-        direct: None,
-        exposed: Vec::new(),
-        method: Method::default(),
-        rows: 0,
-        spacing: Spacing {
-            patch: f32::NAN,
-            element: f32::NAN,
-        },
+        ..Solution::from_contributions(lights, contributions)
     };
     (solution, repaired)
 }

@@ -3,12 +3,12 @@
 use relume::atlas::Atlas;
 use relume::color::Rgb;
 use relume::geometry::Polygon;
-use relume::mesh::{Element, Face, Patch, Spacing};
+use relume::mesh::{Element, Face, Patch};
 use relume::relight::{DecodeTable, table_length};
 use thiserror::Error;
 
 use crate::mesh::OwnedMesh;
-use crate::solution::{Method, Solution, SolutionLight};
+use crate::solution::Solution;
 
 /// Most contributions that are unpacked: 3 GiB of them. Dark tiles take next to no bytes, so that a small file may
 /// promise any number.
@@ -64,29 +64,14 @@ fn filled<T: Copy>(count: usize, value: T) -> Option<Vec<T>> {
 pub fn unpack(atlas: &Atlas) -> Result<Solution, TooLarge> {
     let contributions = contributions(atlas)?;
     let (surfaces, mesh) = unpack_mesh(atlas);
+    let lights = atlas
+        .lights()
+        .map(|light| (light.name.to_owned(), light.emission));
     Ok(Solution {
         surfaces,
-        luminaires: Vec::new(),
         mesh,
         image: atlas.image_size(),
-        lights: atlas
-            .lights()
-            .map(|light| SolutionLight {
-                name: light.name.to_owned(),
-                emission: light.emission,
-                residual: f32::NAN,
-                error: f32::NAN,
-            })
-            .collect(),
-        contributions,
-        direct: None,
-        exposed: Vec::new(),
-        method: Method::default(),
-        rows: 0,
-        spacing: Spacing {
-            patch: f32::NAN,
-            element: f32::NAN,
-        },
+        ..Solution::from_contributions(lights, contributions)
     })
 }
 

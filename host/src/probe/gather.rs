@@ -28,7 +28,7 @@ use crate::bvh::{Bvh, Caster, lifted};
 use crate::gather::{End, Fan, Rays};
 use crate::mesh::Locator;
 use crate::noise;
-use crate::rows::{Parallel, RowFiller};
+use crate::rows::{self, Parallel};
 use crate::solution::Solution;
 
 /// Where rays end that are shorter than so many edges of the element there, direct light is looked at.
@@ -319,28 +319,12 @@ fn grounds(solution: &Solution) -> Vec<Ground> {
 /// Direct irradiance of every element at unit emission, light inside.
 fn direct_of_elements(solution: &Solution, bvh: &Bvh, far: f32) -> Vec<Rgb> {
     let mesh = solution.mesh.view();
-    let lights = solution.lights.len();
-    let mut direct = vec![Rgb::BLACK; mesh.elements.len() * lights];
-    let mut row = vec![0.0; mesh.elements.len()];
     let filler = Parallel::new(&mesh, bvh);
-    let mut add = |light: u32, share: Rgb, row: &[f32]| {
-        let values = direct
-            .iter_mut()
-            .skip(light as usize)
-            .step_by(lights.max(1));
-        for (value, factor) in values.zip(row) {
-            *value += share * *factor;
-        }
-    };
-    for face in mesh.faces {
-        if let Some(emission) = face.emission {
-            filler.lamp(&mesh, &face.polygon, &mut row);
-            add(emission.light, emission.share, &row);
-        }
-    }
-    for luminaire in &solution.luminaires {
-        filler.luminaire(&mesh, luminaire, far, &mut row);
-        add(luminaire.light(), luminaire.share(), &row);
-    }
-    direct
+    rows::direct(
+        &filler,
+        &mesh,
+        &solution.luminaires,
+        far,
+        solution.lights.len(),
+    )
 }

@@ -95,6 +95,37 @@ pub struct Solution {
 }
 
 impl Solution {
+    /// Contributions of lights with these names and nominal emissions, which were not baked here: of elements without a mesh.
+    #[must_use]
+    pub fn from_contributions(
+        lights: impl Iterator<Item = (String, Rgb)>,
+        contributions: Vec<Rgb>,
+    ) -> Self {
+        Self {
+            surfaces: Vec::new(),
+            luminaires: Vec::new(),
+            mesh: OwnedMesh::default(),
+            image: None,
+            lights: lights
+                .map(|(name, emission)| SolutionLight {
+                    name,
+                    emission,
+                    residual: f32::NAN,
+                    error: f32::NAN,
+                })
+                .collect(),
+            contributions,
+            direct: None,
+            exposed: Vec::new(),
+            method: Method::default(),
+            rows: 0,
+            spacing: Spacing {
+                patch: f32::NAN,
+                element: f32::NAN,
+            },
+        }
+    }
+
     /// Share of an element that light can reach.
     #[must_use]
     pub fn exposed(&self, element: usize) -> f32 {
