@@ -7,7 +7,8 @@
 //! * the light alone in its own colour, where `2 t` display codes are bearable,
 //! * the channel alone, where `3 t` are: then the exposure follows the luminance, `0.2126 R + 0.7152 G + 0.0722 B`, and blue is
 //!   up to 14 times overexposed,
-//! * both of what is shown, with the reflectance of the element, where a fifth more is bearable,
+//! * the light among all others at their nominal emission, 16 times overexposed, where `3 t` are,
+//! * all three of what is shown, with the reflectance of the element, where a fifth more is bearable,
 //! * above white any state, if the relative error times 112.09 is at most `2 t`: that is the display error where this light is
 //!   dimmed among others and dominates an element.
 //!
@@ -50,8 +51,14 @@ const PRIMARIES: [Rgb; 3] = [
     Rgb::new(0.0, 0.0, 1.0),
 ];
 
-/// Bearable display errors of a light alone, in its colour and in a primary.
-const BEARABLE: [f32; 2] = [2.0, 3.0];
+/// Bearable display errors of a light alone, in its colour and in a primary, and among all others when overexposed.
+const BEARABLE: [f32; STATES] = [2.0, 3.0, 3.0];
+
+/// Exposure in the last of these states, over that which suits it.
+const OVEREXPOSED: f32 = 16.0;
+
+/// States in which a value is judged.
+const STATES: usize = 3;
 
 /// How much more is bearable of what is shown.
 const MORE_SHOWN: f32 = 1.2;
@@ -66,6 +73,7 @@ pub(super) fn entries<'a>(
 ) -> Result<Vec<LightEntry<'a>>, PackError> {
     let (solution, values) = (source.solution, &*source.values);
     let common = common_scales(solution, values);
+    let stage = Stage::new(source);
     let lights = solution.lights.len();
     let entry = |light: usize| {
         let SolutionNames { name, emission } = names(solution, light);
@@ -82,7 +90,7 @@ pub(super) fn entries<'a>(
             Code::Lum8 => exponential(Scale::fitting(largest(own().map(Rgb::luminance)))),
             Code::Display8 => {
                 let own: Vec<Rgb> = own().collect();
-                let [Some(r), Some(g), Some(b)] = display_curves(source, &own, emission) else {
+                let [Some(r), Some(g), Some(b)] = display_curves(&stage, &own, emission) else {
                     return Err(refused());
                 };
                 Ok(LightEntry {
@@ -148,11 +156,9 @@ fn scale_or_one(white: f32) -> Scale {
 /// in units of light `m`, at nominal emission `e_m`, is `p98 / e_m`.
 fn common_scales(solution: &Solution, values: &[Rgb]) -> Vec<Option<Scale>> {
     let nominal = solution.nominal_mix();
-    let state = values.chunks(nominal.len().max(1)).map(|values| {
-        let weighted = values.iter().zip(&nominal);
-        weighted.fold(Rgb::BLACK, |sum, (value, weight)| sum + *value * *weight)
-    });
-    let one = Some(white(state)).filter(|w| *w > 0.0).unwrap_or(1.0);
+    let one = Some(white(all_on(solution, values)))
+        .filter(|w| *w > 0.0)
+        .unwrap_or(1.0);
     nominal
         .iter()
         .map(|emission| {
@@ -162,36 +168,64 @@ fn common_scales(solution: &Solution, values: &[Rgb]) -> Vec<Option<Scale>> {
         .collect()
 }
 
+/// The state of all lights at their nominal emission.
+fn all_on<'a>(solution: &Solution, values: &'a [Rgb]) -> impl Iterator<Item = Rgb> + Clone + 'a {
+    let nominal = solution.nominal_mix();
+    values.chunks(nominal.len().max(1)).map(move |values| {
+        let weighted = values.iter().zip(&nominal);
+        weighted.fold(Rgb::BLACK, |sum, (value, weight)| sum + *value * *weight)
+    })
+}
+
+/// What `display8` needs to know of all lights together.
+struct Stage {
+    /// Reflectances of the elements, 1 where they are multiplied in.
+    reflectances: Vec<Rgb>,
+    /// What shows as white with all lights on, 16 times overexposed: packed and shown.
+    overexposed: [f32; 2],
+}
+
+impl Stage {
+    fn new(source: &Source) -> Self {
+        let solution = source.solution;
+        let reflectances: Vec<Rgb> = match source.quantity {
+            Quantity::Irradiance => {
+                let elements = solution.mesh.elements.iter();
+                elements.map(|element| element.reflectance).collect()
+            }
+            Quantity::Radiosity | Quantity::Radiance => {
+                vec![Rgb::WHITE; solution.element_count()]
+            }
+        };
+        let all_on: Vec<Rgb> = all_on(solution, &source.values).collect();
+        let overexposed = whites(all_on.iter().copied(), &reflectances);
+        Self {
+            reflectances,
+            overexposed: overexposed.map(|white| white / OVEREXPOSED),
+        }
+    }
+}
+
+/// What shows as white in a state: packed and shown.
+fn whites(lit: impl Iterator<Item = Rgb> + Clone, reflectances: &[Rgb]) -> [f32; 2] {
+    let shown = lit.clone().zip(reflectances);
+    [white(lit), white(shown.map(|(value, rho)| value * *rho))]
+}
+
 /// The best display curve of each channel of a light.
-fn display_curves(source: &Source, own: &[Rgb], emission: Rgb) -> [Option<Curve>; 3] {
-    let reflectances: Vec<Rgb> = match source.quantity {
-        Quantity::Irradiance => source
-            .solution
-            .mesh
-            .elements
-            .iter()
-            .map(|e| e.reflectance)
-            .collect(),
-        Quantity::Radiosity | Quantity::Radiance => vec![Rgb::WHITE; own.len()],
-    };
-    let whites = |weight: Rgb| {
-        let lit = own.iter().map(|value| *value * weight);
-        let shown = lit
-            .clone()
-            .zip(&reflectances)
-            .map(|(value, rho)| value * *rho);
-        [white(lit), white(shown)]
-    };
+fn display_curves(stage: &Stage, own: &[Rgb], emission: Rgb) -> [Option<Curve>; 3] {
+    let alone = |weight: Rgb| whites(own.iter().map(|value| *value * weight), &stage.reflectances);
     let nominal = Solo::Nominal.weight(emission);
-    let in_nominal = whites(nominal);
+    let in_nominal = alone(nominal);
     [0, 1, 2].map(|channel| {
         let at = |rgb: Rgb| rgb.to_array()[channel];
         // A light that lacks this channel shows it in its primary only.
         let nominal = in_nominal.map(|white| white / at(nominal));
-        let primary = whites(PRIMARIES[channel]);
-        let places = own.iter().zip(&reflectances);
+        let overexposed = stage.overexposed.map(|white| white / at(emission));
+        let states = [nominal, alone(PRIMARIES[channel]), overexposed];
+        let places = own.iter().zip(&stage.reflectances);
         let samples = places
-            .map(|(value, rho)| Sample::new(at(*value), at(*rho), nominal, primary))
+            .map(|(value, rho)| Sample::new(at(*value), at(*rho), states))
             .collect();
         display_curve(samples, nominal[0].min(white(own.iter().copied())))
     })
@@ -293,50 +327,47 @@ fn continued_code(u: f32) -> f32 {
 #[derive(Clone, Copy)]
 struct Sample {
     value: f32,
-    /// What shows it as white: with the light alone, packed and shown, and with its channel alone.
-    whites: [f32; 4],
+    /// What shows it as white in every state, packed and shown.
+    whites: [[f32; 2]; STATES],
     /// Its display codes then.
-    shown: [f32; 4],
+    shown: [[f32; 2]; STATES],
 }
 
 impl Sample {
-    /// A value on a reflectance, with the whites of its light, packed and shown, in nominal colour and in the primary.
-    fn new(value: f32, reflectance: f32, nominal: [f32; 2], primary: [f32; 2]) -> Self {
-        let whites = [
-            nominal[0],
-            nominal[1] / reflectance,
-            primary[0],
-            primary[1] / reflectance,
-        ];
+    /// A value on a reflectance, with the whites of its light.
+    fn new(value: f32, reflectance: f32, whites: [[f32; 2]; STATES]) -> Self {
+        let whites = whites.map(|[packed, shown]| [packed, shown / reflectance]);
         Self {
             value,
             whites,
-            shown: whites.map(|white| shown_code(value / white)),
+            shown: whites.map(|whites| whites.map(|white| shown_code(value / white))),
         }
     }
 
     /// From the smallest to the largest value that may take its place.
     fn interval(&self, tolerance: f32) -> [f32; 2] {
-        let [in_colour, in_primary] = BEARABLE.map(|codes| codes * tolerance);
-        let bearable = [
-            in_colour,
-            in_colour * MORE_SHOWN,
-            in_primary,
-            in_primary * MORE_SHOWN,
-        ];
         let [mut low, mut high] = [0.0_f32, f32::INFINITY];
-        if self.value > self.whites[0] {
+        if self.value > self.whites[0][0] {
             let ratio = tolerance * BEARABLE_RATIO / CODES_PER_RATIO;
             [low, high] = [self.value * (1.0 - ratio), self.value * (1.0 + ratio)];
         }
-        for ((white, shown), bearable) in self.whites.iter().zip(self.shown).zip(bearable) {
-            // A colour or a place that shows nothing bears everything.
-            if white.is_finite() && *white > 0.0 {
-                low = low.max(white * linear(shown - bearable));
-                // The nearest level is taken, even where one that is clipped would do better.
-                if shown < WHITEST {
-                    high = high.min(white * linear(shown + bearable));
-                }
+        let bearable = BEARABLE.map(|codes| [codes * tolerance, codes * tolerance * MORE_SHOWN]);
+        let states = self.whites.iter().zip(&self.shown).zip(&bearable);
+        let states = states.flat_map(|((whites, shown), bearable)| {
+            whites
+                .iter()
+                .zip(shown)
+                .zip(bearable)
+                .map(|((w, s), b)| (*w, *s, *b))
+        });
+        // A colour or a place that shows nothing bears everything.
+        for (white, shown, bearable) in
+            states.filter(|(white, ..)| white.is_finite() && *white > 0.0)
+        {
+            low = low.max(white * linear(shown - bearable));
+            // The nearest level is taken, even where one that is clipped would do better.
+            if shown < WHITEST {
+                high = high.min(white * linear(shown + bearable));
             }
         }
         [low.min(self.value), high.max(self.value)]
