@@ -284,6 +284,30 @@ mod tests {
 
     const SQUARE: [[f32; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
 
+    /// The beginning of a grey PNG of this height, 8192 wide, with the CRC-32 of its header.
+    fn start_of_png(height: u32, crc: u32) -> Vec<u8> {
+        let header = [
+            &8192_u32.to_be_bytes()[..],
+            &height.to_be_bytes(),
+            &[8, 0, 0, 0, 0],
+        ];
+        [
+            b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR".to_vec(),
+            header.concat(),
+            crc.to_be_bytes().to_vec(),
+            b"\0\0\x01\0IDAT".to_vec(),
+        ]
+        .concat()
+    }
+
+    #[test]
+    fn an_image_above_the_limit_is_refused_by_its_header() {
+        let error = |height, crc| Image::decode(&start_of_png(height, crc)).unwrap_err();
+        assert!(matches!(error(8193, 0x9c9d_4620), ImageError::Limits(_)));
+        // One row less is legal, and then the texels are missing.
+        assert!(!matches!(error(8192, 0x57c1_9585), ImageError::Limits(_)));
+    }
+
     #[test]
     fn a_quad_averages_exactly_the_texels_that_it_covers() {
         let quad = texture(2, &[0.1, 0.3, 0.5, 0.9], &SQUARE);

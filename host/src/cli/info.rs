@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 use relume::atlas::{Atlas, LARGEST_SIDE, Quantity, Tiles};
-use relume::code::{Curve, KNOT_UNITS, LOG_STEPS};
+use relume::code::{Curve, LOG_STEPS};
 use relume::relight::FixedWeight;
 use serde_json::{Value, json};
 
@@ -135,10 +135,13 @@ fn curve(curve: Curve) -> Value {
             "white": white.value(),
             "step": Curve::display_codes(step),
         }),
-        Curve::Knots { white, knots } => json!({
-            "white": white.value(),
-            "knots": knots.map(|knot| f32::from(knot) / f32::from(KNOT_UNITS)),
-        }),
+        Curve::Parts { white, .. } => {
+            let values: Vec<f32> = (0..256)
+                .step_by(16)
+                .map(|code| curve.decode(code))
+                .collect();
+            json!({"white": white.value(), "values_of_parts": values})
+        }
         Curve::Logarithmic { .. } => json!({"steps_per_octave": LOG_STEPS}),
     }
 }

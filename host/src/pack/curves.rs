@@ -1,15 +1,15 @@
 //! What the codes of every light stand for.
 //!
 //! `exp8` has one scale, as published; `exp8s` and `lum8` put the largest value of a light at their top.
-//! `display8` has 256 levels for every channel of a light, in 16 parts of equal steps (see [`Curve::Knots`]). A level may
+//! `display8` has 256 levels for every channel of a light, in 16 parts of equal steps (see [`Curve::Parts`]). A level may
 //! stand for a value where it bears that, at a tolerance `t` and in
 //!
 //! * the light alone in its own colour, where `2 t` display codes are bearable,
 //! * the channel alone, where `3 t` are: then the exposure follows the luminance, `0.2126 R + 0.7152 G + 0.0722 B`, and blue is
 //!   up to 14 times overexposed,
 //! * the light among all others at their nominal emission, 16 times overexposed, where `3 t` are,
-//! * all three of what is shown, with the reflectance of the element, where a fifth more is bearable,
-//! * above white any state, if the relative error times 112.09 is at most `2 t`: that is the display error where this light is
+//! * all three of what is shown, with the reflectance of the element, where half as much again is bearable,
+//! * above white any state, if the relative error times 112.09 is at most `2.1 t`: that is the display error where this light is
 //!   dimmed among others and dominates an element.
 //!
 //! So every value has an interval, and each part in turn takes the longest steps with which a level falls into all intervals
@@ -19,7 +19,10 @@
 
 use rayon::prelude::*;
 use relume::atlas::{LARGEST_TILE_CODE, LightEntry, Quantity};
-use relume::code::{Code, Curve, KNOT_CODES, KNOT_UNITS, KNOTS, Scale, srgb_linear};
+use relume::code::{
+    Code, Curve, LARGEST_PART_FIRST, LARGEST_PART_UNIT, PART_CODES, PART_STEPS, PARTS, Scale,
+    srgb_linear,
+};
 use relume::color::Rgb;
 
 use super::{PackError, Packing, Source};
@@ -27,9 +30,9 @@ use crate::display_error::{Solo, shown_code};
 use crate::picture::white;
 use crate::solution::Solution;
 
-/// What the light's own white is over that of its curves: below the latter, steps of a part are uniform on a display, above
-/// it in ratio.
-const WHITES: [f32; 6] = [4.0, 1.0, 2.0, 8.0, 16.0, 32.0];
+/// Whites that are tried: own white over powers of the cube root of 2. Below its white, steps of a part are uniform on a
+/// display, above it in ratio.
+const WHITES: u8 = 18;
 
 /// Tolerances that are tried lie between these.
 const LEAST_TOLERANCE: f32 = 1e-3;
@@ -37,9 +40,6 @@ const MOST_TOLERANCE: f32 = 64.0;
 
 /// Ratio of two tolerances that are not told apart.
 const TOLERANCE: f32 = 1.01;
-
-/// Ratio of the steps of a part that are tried one after the other.
-const STEPS: f32 = 0.98;
 
 /// Display codes per relative error at white: `255 * 1.055 / 2.4`.
 const CODES_PER_RATIO: f32 = 112.093_75;
@@ -61,10 +61,10 @@ const OVEREXPOSED: f32 = 16.0;
 const STATES: usize = 3;
 
 /// How much more is bearable of what is shown.
-const MORE_SHOWN: f32 = 1.2;
+const MORE_SHOWN: f32 = 1.5;
 
 /// Bearable relative error above white, times [`CODES_PER_RATIO`].
-const BEARABLE_RATIO: f32 = 2.0;
+const BEARABLE_RATIO: f32 = 2.1;
 
 /// The lights with their curves; a packing per light.
 pub(super) fn entries<'a>(
@@ -236,24 +236,24 @@ fn display_curve(samples: Vec<Sample>, own_white: f32) -> Option<Curve> {
     let values = samples.iter().map(|sample| sample.value);
     let smallest = values.clone().min_by(f32::total_cmp).unwrap_or(0.0);
     let even = |white: Scale| Curve::display_between(white, smallest, largest(values.clone()));
-    let own = Scale::at_least(own_white).filter(|_| own_white > 0.0);
-    if own.is_none() {
-        return even(Scale::ONE);
+    let top = scale_or_one(largest(values.clone()));
+    if own_white <= 0.0 || Scale::at_least(own_white).is_none() {
+        return even(top);
     }
-    let (mut best, mut least) = (even(scale_or_one(own_white)), MOST_TOLERANCE);
-    for part in WHITES {
-        let white = scale_or_one(own_white / part);
+    let (mut best, mut least) = (even(top), MOST_TOLERANCE);
+    for part in 0..WHITES {
+        let white = scale_or_one(own_white * 2.0_f32.powf(f32::from(part) / -3.0));
         // Most whites are no better than the one before them.
-        if let Some((tolerance, knots)) = tightest(&samples, white.value(), least / TOLERANCE) {
-            (best, least) = (Some(Curve::Knots { white, knots }), tolerance);
+        if let Some((tolerance, curve)) = tightest(&samples, white, least / TOLERANCE) {
+            (best, least) = (Some(curve), tolerance);
         }
     }
     best
 }
 
-/// Knots of the least tolerance, and that; `None` when it is above `most`.
-fn tightest(samples: &[Sample], white: f32, most: f32) -> Option<(f32, [u16; KNOTS])> {
-    let at = |tolerance: f32| Some((tolerance, knots(samples, white, tolerance)?));
+/// The curve of the least tolerance, and that; `None` when it is above `most`.
+fn tightest(samples: &[Sample], white: Scale, most: f32) -> Option<(f32, Curve)> {
+    let at = |tolerance: f32| Some((tolerance, parts(samples, white, tolerance)?));
     let mut best = at(most)?;
     let mut low = 0.0;
     while best.0 > LEAST_TOLERANCE && best.0 > TOLERANCE * low {
@@ -270,49 +270,56 @@ fn tightest(samples: &[Sample], white: f32, most: f32) -> Option<(f32, [u16; KNO
     Some(best)
 }
 
-/// Knots of a curve that has a level in the interval of every sample; `None` when so many parts do not suffice.
-fn knots(samples: &[Sample], white: f32, tolerance: f32) -> Option<[u16; KNOTS]> {
-    let unit = |value: f32| f32::from(KNOT_UNITS) * continued_code(value / white);
+/// A curve that has a level in the interval of every sample; `None` when so many parts do not suffice.
+fn parts(samples: &[Sample], white: Scale, tolerance: f32) -> Option<Curve> {
+    let unit = |value: f32| 4096.0 * continued_code(value / white.value());
     let intervals = samples.iter().map(|s| s.interval(tolerance).map(unit));
     let mut intervals: Vec<[f32; 2]> = intervals.collect();
     intervals.sort_unstable_by(|[a, _], [b, _]| a.total_cmp(b));
     let start = intervals.iter().map(|[_, to]| *to);
-    let mut knots = [start.fold(f32::INFINITY, f32::min).max(0.0) as u16; KNOTS];
-    let mut open = &intervals[..];
-    for part in 1..KNOTS {
-        let from = knots[part - 1];
-        let begin = f32::from(from);
-        open = &open[open.partition_point(|[low, _]| *low <= begin)..];
-        // Past the last code there is no level.
-        let codes = KNOT_CODES - u16::from(part == KNOTS - 1);
-        let holds = |length: u16| {
-            let step = f32::from(length) / f32::from(KNOT_CODES);
-            let level = |code: f32| begin + code * step;
-            let end = level(codes.into());
-            let mut begun = open.iter().take_while(|[low, _]| *low <= end);
-            begun.all(|[low, high]| level(((low - begin) / step).ceil()) <= *high)
-        };
-        let left = u16::MAX - from;
-        let lengths = std::iter::successors(Some(LONGEST_PART.min(left)), |length| {
-            Some((f32::from(*length) * STEPS) as u16)
-        });
-        let length = if open.is_empty() {
-            left.min(1)
-        } else {
-            lengths
-                .take_while(|length| *length > 0)
-                .find(|l| holds(*l))?
-        };
-        knots[part] = from + length;
+    let first = (start.fold(f32::INFINITY, f32::min).max(0.0) / 256.0).floor();
+    if first > f32::from(LARGEST_PART_FIRST) {
+        return None;
     }
-    let [.., from, to] = knots;
-    let last = f32::from(to) - f32::from(to - from) / f32::from(KNOT_CODES);
-    let is_reached = intervals.last().is_none_or(|[low, _]| *low <= last);
-    (is_reached && knots.is_sorted_by(|a, b| a < b)).then_some(knots)
+    // Steps are about twice what is bearable, of which most is 3 codes; the largest are 4.4 times the smallest.
+    let largest = (6.0 * tolerance * 16.0).log2().ceil().max(0.0) as u8;
+    let mut units = (largest.saturating_sub(4)..=largest).filter(|unit| *unit <= LARGEST_PART_UNIT);
+    units.find_map(|unit| {
+        let steps = steps(&intervals, 256.0 * first, unit)?;
+        Some(Curve::Parts {
+            white,
+            first: first as u16,
+            unit,
+            steps,
+        })
+    })
 }
 
-/// The longest part, in units of knots: 1024 display codes.
-const LONGEST_PART: u16 = 1 << 14;
+/// The steps of all parts, each the longest one that the intervals that begin within it bear.
+fn steps(intervals: &[[f32; 2]], first: f32, unit: u8) -> Option<[u8; PARTS / 2]> {
+    let mut steps = [0; PARTS / 2];
+    let (mut open, mut begin, mut last) = (intervals, first, first);
+    for part in 0..PARTS {
+        open = &open[open.partition_point(|[low, _]| *low <= begin)..];
+        if open.is_empty() {
+            return Some(steps);
+        }
+        let step = |place: u8| f32::from(PART_STEPS[usize::from(place)]) * f32::from(1_u16 << unit);
+        // Past the last code there is no level.
+        let codes = f32::from(PART_CODES - u16::from(part == PARTS - 1));
+        let place = (0..16).rev().find(|place| {
+            let step = step(*place);
+            let end = begin + codes * step;
+            let mut begun = open.iter().take_while(|[low, _]| *low <= end);
+            begun.all(|[low, high]| begin + ((low - begin) / step).ceil() * step <= *high)
+        })?;
+        steps[part / 2] |= if part % 2 == 0 { place } else { place << 4 };
+        last = begin + codes * step(place);
+        begin += f32::from(PART_CODES) * step(place);
+    }
+    let is_reached = open.last().is_none_or(|[low, _]| *low <= last);
+    is_reached.then_some(steps)
+}
 
 /// The display code of a value over white, above it too; within 3e-4.
 fn continued_code(u: f32) -> f32 {

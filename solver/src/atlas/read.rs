@@ -6,9 +6,9 @@ use super::tiles::{Block, LARGEST_SIDE, Tiles};
 use super::{
     AtlasElement, AtlasError, AtlasFace, AtlasLight, CHECKSUM_AT, CODE_AT, CURVE_BYTES, CURVES_AT,
     CountsOf, ELEMENT_BYTES, FACE_BYTES, HEADER_BYTES, LARGEST_TILE_CODE, LIGHT_BYTES, MAGIC,
-    NO_LIGHT, NOT_MEASURED, Quantity, ROW_BYTES, SURFACE_BYTES, VERSION, WorstError, checksum,
+    NO_LIGHT, NOT_MEASURED, Quantity, SURFACE_BYTES, VERSION, WorstError, checksum,
 };
-use crate::code::{Code, Curve, KNOTS, Scale};
+use crate::code::{Code, Curve, LARGEST_PART_FIRST, LARGEST_PART_UNIT, Scale};
 use crate::color::{Reflectance, Rgb};
 use crate::geometry::Polygon;
 use crate::mesh::Side;
@@ -23,8 +23,6 @@ pub struct Atlas<'a> {
     worst_error: Option<WorstError>,
     lights: &'a [u8],
     names: &'a str,
-    /// Rows of knots.
-    knots: &'a [u8],
     /// Bytes of codes per element.
     stride: usize,
     codes: &'a [u8],
@@ -72,8 +70,9 @@ impl<'a> Atlas<'a> {
             stride += code.bytes();
             is_tiled |= code.is_tiled();
         }
-        let codes = (0..counts.lights).filter_map(|tag| code_at(lights, tag));
-        let needed = counts.layout(codes).ok_or(AtlasError::Illegal("size"))?;
+        let needed = counts
+            .layout(stride as u64)
+            .ok_or(AtlasError::Illegal("size"))?;
         if needed.end != u64::from(header.length) {
             return Err(AtlasError::Illegal("length"));
         }
@@ -88,7 +87,7 @@ impl<'a> Atlas<'a> {
         }
 
         let part = |from: u64, to: u64| bytes.get(from as usize..to as usize).unwrap_or_default();
-        let names = core::str::from_utf8(part(needed.names, needed.knots));
+        let names = core::str::from_utf8(part(needed.names, needed.codes));
         let tiles = part(needed.tiles, needed.surfaces);
         let is_image = header.image_width > 0;
         if is_image
@@ -107,7 +106,6 @@ impl<'a> Atlas<'a> {
             worst_error: header.worst_error,
             lights,
             names: names.map_err(|_| AtlasError::Illegal("light name"))?,
-            knots: part(needed.knots, needed.codes),
             stride,
             codes: part(needed.codes, needed.tiles),
             tiles: tiles.transpose()?,
@@ -125,7 +123,7 @@ impl<'a> Atlas<'a> {
     fn check_lights(&self) -> Result<(), AtlasError> {
         let mut named = 0_usize;
         for tag in 0..self.counts.lights {
-            let record = self.light(tag);
+            let record = LightRecord::parse(record(self.lights, tag, LIGHT_BYTES));
             let record = record.ok_or(AtlasError::Illegal("light"))?;
             if record.error.is_some() != self.worst_error.is_some() {
                 return Err(AtlasError::Illegal("error of a light"));
@@ -176,9 +174,9 @@ impl<'a> Atlas<'a> {
 
     /// The lights, in the order of their tags.
     pub fn lights(&self) -> impl Iterator<Item = AtlasLight<'a>> + use<'a> {
-        let (atlas, mut names) = (*self, self.names);
+        let (lights, mut names) = (self.lights, self.names);
         (0..self.counts.lights).filter_map(move |tag| {
-            let record = atlas.light(tag)?;
+            let record = LightRecord::parse(record(lights, tag, LIGHT_BYTES))?;
             let (name, rest) = names.split_at_checked(usize::from(record.name_length))?;
             names = rest;
             Some(AtlasLight {
@@ -192,14 +190,10 @@ impl<'a> Atlas<'a> {
         })
     }
 
-    fn light(&self, tag: u32) -> Option<LightRecord> {
-        LightRecord::parse(record(self.lights, tag, LIGHT_BYTES), self.knots)
-    }
-
     /// What the codes of a light stand for, and the largest of each channel; `None` without such a light.
     #[must_use]
     pub fn curves(&self, light: u32) -> Option<([Curve; 3], [u16; 3])> {
-        let record = self.light(light)?;
+        let record = LightRecord::parse(record(self.lights, light, LIGHT_BYTES))?;
         Some((record.curves, record.last))
     }
 
@@ -502,7 +496,7 @@ struct LightRecord {
 }
 
 impl LightRecord {
-    fn parse(bytes: &[u8], knots: &[u8]) -> Option<Self> {
+    fn parse(bytes: &[u8]) -> Option<Self> {
         let mut input = Input(bytes);
         let emission = input.rgb().filter(|emission| emission.is_legal())?;
         let [code, 0] = input.take()? else {
@@ -513,9 +507,9 @@ impl LightRecord {
         let error = error(input.u32()?)?;
         input.u16().filter(|reserved| *reserved == 0)?;
         let ((r, last_r), (g, last_g), (b, last_b)) = (
-            curve(code, &mut input, knots)?,
-            curve(code, &mut input, knots)?,
-            curve(code, &mut input, knots)?,
+            curve(code, &mut input)?,
+            curve(code, &mut input)?,
+            curve(code, &mut input)?,
         );
         Some(Self {
             emission,
@@ -528,18 +522,27 @@ impl LightRecord {
     }
 }
 
-/// A curve, whose knots stand in some rows, and its last code.
-fn curve(code: Code, input: &mut Input, rows: &[u8]) -> Option<(Curve, u16)> {
+/// A curve and its last code.
+fn curve(code: Code, input: &mut Input) -> Option<(Curve, u16)> {
     let scale = Scale::from_parts(input.u16()?, i16::from_le_bytes(input.take()?))?;
+    if code == Code::Display8 {
+        let head = input.u16()?;
+        let (first, unit) = (head & LARGEST_PART_FIRST, (head >> 12) as u8);
+        let curve = Curve::Parts {
+            white: scale,
+            first,
+            unit,
+            steps: input.take()?,
+        };
+        let last = u8::MAX.into();
+        let is_legal = unit <= LARGEST_PART_UNIT && curve.reaches(last);
+        return is_legal.then_some((curve, last));
+    }
     let (first, step, last) = (input.u32()?, input.u32()?, input.u16()?);
     let curve = match code {
         Code::Exp8 | Code::Exp8s | Code::Lum8 if first == 0 && step == 0 => {
             Curve::Exponential { scale }
         }
-        Code::Display8 if step == 0 => Curve::Knots {
-            white: scale,
-            knots: knots(record(rows, first, ROW_BYTES))?,
-        },
         Code::Tiles if first == 0 && step > 0 => Curve::Display { white: scale, step },
         Code::TilesLog if scale == Scale::ONE && step == 0 => Curve::Logarithmic { first },
         _ => return None,
@@ -550,14 +553,6 @@ fn curve(code: Code, input: &mut Input, rows: &[u8]) -> Option<(Curve, u16)> {
         last == u16::from(u8::MAX)
     };
     (is_legal && curve.reaches(last)).then_some((curve, last))
-}
-
-/// A row of knots; `None` unless each is above the one before it.
-fn knots(row: &[u8]) -> Option<[u16; KNOTS]> {
-    let (row, _) = row.as_chunks::<2>();
-    let row: &[[u8; 2]; KNOTS] = row.try_into().ok()?;
-    let knots = row.map(u16::from_le_bytes);
-    knots.is_sorted_by(|a, b| a < b).then_some(knots)
 }
 
 /// The code of light `tag` of a table of lights; `None` when there is no such code.

@@ -221,8 +221,7 @@ fn what_the_format_does_not_allow_is_an_error() {
     let sound = sample();
     let names = "ceilingLämpchengreyin tiles".len();
     let lights = |tag: usize| 56 + tag * 64;
-    let knots = lights(4) + names;
-    let tiles = knots + 3 * 34 + 8 * (3 + 3 + 1);
+    let tiles = lights(4) + names + 8 * (3 + 3 + 1);
     let surfaces = tiles + TILES.len();
     let faces = surfaces + 2 * 52;
     let elements = faces + 3 * 24;
@@ -242,7 +241,7 @@ fn what_the_format_does_not_allow_is_an_error() {
         (48, &[0xff; 8], "error of a light"),
         (lights(0), &minus, "light"),
         (lights(0) + 12, &[9], "code"),
-        (lights(0) + 12, &[2], "length"),
+        (lights(1) + 12, &[1], "light"),
         (lights(0) + 13, &[1], "light"),
         (lights(0) + 14, &[0], "light name"),
         (lights(0) + 16, &nan, "light"),
@@ -251,9 +250,7 @@ fn what_the_format_does_not_allow_is_an_error() {
         (lights(0) + 22, &[0, 1], "light"),
         (lights(0) + 26, &[1], "light"),
         (lights(0) + 34, &[254], "light"),
-        (lights(1) + 26, &[3], "light"),
-        (lights(1) + 30, &[1], "light"),
-        (knots + 2, &[0; 2], "light"),
+        (lights(1) + 27, &[0xc0], "light"),
         (lights(3) + 26, &[1], "light"),
         (lights(3) + 30, &[0; 4], "light"),
         (lights(3) + 35, &[0x80], "light"),

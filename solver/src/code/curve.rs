@@ -6,8 +6,7 @@
 //!   `f(C) = e^((C - 255) / K)` above, `K = 255 * 1.055 / 2.4 = 112.09`, which continues it with the
 //!   same slope. `f` is *defined* by two tables, linear in between, so that a decoder needs no float: it is within
 //!   7e-4 of the formula, relative to the value (the largest distance is at `C = 11`).
-//! * Knots: the same `f`, but `C` is linear between 17 knots, which stand at the codes 0, 16, ..., 256 and are whole numbers
-//!   of sixteenths of a display code: every part of 16 codes has steps of its own.
+//! * Parts: the same `f`, but every 16 codes have a step of their own, [`PART_STEPS`]`[n] 2^unit`, `n` in four bits.
 //! * Logarithmic: `x = 0` for code 0, else `x = 2^((first + c - 1) / N - 200)`, `N = 42` steps an
 //!   octave, so that every positive float has a code.
 //!
@@ -37,14 +36,22 @@ const LOG_BEGIN: i32 = -200;
 /// Units of the display curve in a display code.
 const UNITS: u32 = 1 << 12;
 
-/// Knots of a curve of 256 codes.
-pub const KNOTS: usize = 17;
+/// Parts of a curve of 256 codes.
+pub const PARTS: usize = 16;
 
-/// Codes from a knot to the next.
-pub const KNOT_CODES: u16 = 16;
+/// Codes of a part.
+pub const PART_CODES: u16 = 16;
 
-/// Units of a knot in a display code.
-pub const KNOT_UNITS: u16 = 16;
+/// Steps that a part can have, times `2^unit`, in 2^-12 display codes: `256 * 2^(n / 7)`.
+pub const PART_STEPS: [u16; 16] = [
+    256, 283, 312, 345, 380, 420, 464, 512, 565, 624, 689, 761, 840, 927, 1024, 1131,
+];
+
+/// The largest unit of such steps.
+pub const LARGEST_PART_UNIT: u8 = 11;
+
+/// The largest code 0 of a curve of parts, in 1/16 display code.
+pub const LARGEST_PART_FIRST: u16 = (1 << 12) - 1;
 
 /// Display codes at white.
 const WHITE: u32 = 255;
@@ -87,12 +94,16 @@ pub enum Curve {
         /// From a code to the next, in 2^-12 display codes; at least 1.
         step: u32,
     },
-    /// Uniform in display codes between knots.
-    Knots {
+    /// Uniform in display codes within each of 16 parts.
+    Parts {
         /// The value at 255 display codes.
         white: Scale,
-        /// Where the codes 0, 16, ..., 256 lie, in 1/16 display code; each above the one before it.
-        knots: [u16; KNOTS],
+        /// Code 0, in 1/16 display code; at most [`LARGEST_PART_FIRST`].
+        first: u16,
+        /// The power of two on the steps; at most [`LARGEST_PART_UNIT`].
+        unit: u8,
+        /// Steps of the parts, as places in [`PART_STEPS`], two in a byte: the lower four bits come first.
+        steps: [u8; PARTS / 2],
     },
     /// Uniform in logarithms, and zero.
     Logarithmic {
@@ -114,31 +125,58 @@ impl Curve {
             })
     }
 
-    /// The step of a display curve, in display codes.
+    /// Units of a display curve in display codes.
     #[must_use]
     pub fn display_codes(units: u32) -> f32 {
         units as f32 / UNITS as f32
     }
 
-    /// Knots at the same distance, with code 0 at `smallest`, or below by rounding, and code 255 at `largest` or above;
+    /// Parts of the same step, with code 0 at `smallest`, or below by rounding, and code 255 at `largest` or above;
     /// `None` unless `0 <= smallest <= largest` and the curve reaches that far.
     #[must_use]
     pub fn display_between(white: Scale, smallest: f32, largest: f32) -> Option<Self> {
-        let units = |value: f32| display_code(value / white.value()) * f32::from(KNOT_UNITS);
-        let (low, high) = (math::floor(units(smallest)), math::ceil(units(largest)));
-        // Code 255 is a sixteenth of a part below the last knot.
-        let parts = KNOTS as f32 - 1.0;
-        let distance = math::ceil((high - low) / (parts - 1.0 / f32::from(KNOT_CODES))).max(1.0);
-        if !(smallest >= 0.0 && low <= high && low + parts * distance <= f32::from(u16::MAX)) {
+        let code = |value: f32| display_code(value / white.value());
+        let first = math::floor(code(smallest) * 16.0);
+        // A unit more outweighs the rounding of the code, which has 24 bits.
+        let end = code(largest) * UNITS as f32 * (1.0 + f32::EPSILON) + 1.0;
+        let is_legal = smallest >= 0.0 && smallest <= largest;
+        if !(is_legal && first <= f32::from(LARGEST_PART_FIRST)) {
             return None;
         }
-        let mut knot = low as u16;
-        let knots = core::array::from_fn(|_| {
-            let own = knot;
-            knot = knot.saturating_add(distance as u16);
-            own
+        let steps = (0..=LARGEST_PART_UNIT).flat_map(|unit| (0_u8..16).map(move |n| (unit, n)));
+        let mut curves = steps.map(|(unit, n)| Self::Parts {
+            white,
+            first: first as u16,
+            unit,
+            steps: [n << 4 | n; PARTS / 2],
         });
-        Some(Self::Knots { white, knots })
+        curves.find(|curve| curve.units(u8::MAX.into()) as f32 >= end)
+    }
+
+    /// Where a code lies on a display curve, in 2^-12 display codes; 0 on others.
+    fn units(&self, code: u16) -> u32 {
+        match *self {
+            Self::Display { step, .. } => step.saturating_mul(code.into()),
+            Self::Parts { first, .. } => {
+                let (part, within) = (byte(code) >> 4, byte(code) & 15);
+                let before: u32 = (0..part).map(|part| self.part_step(part)).sum();
+                let first = u32::from(first) * (UNITS / 16);
+                let before = before * u32::from(PART_CODES);
+                first + before + self.part_step(part) * u32::from(within)
+            }
+            Self::Exponential { .. } | Self::Logarithmic { .. } => 0,
+        }
+    }
+
+    /// The step of a part, in 2^-12 display codes; 0 without parts.
+    fn part_step(&self, part: u8) -> u32 {
+        let Self::Parts { unit, steps, .. } = self else {
+            return 0;
+        };
+        let pair = steps.get(usize::from(part / 2)).copied().unwrap_or(0);
+        let place = if part % 2 == 0 { pair & 15 } else { pair >> 4 };
+        let step = PART_STEPS.get(usize::from(place)).copied().unwrap_or(0);
+        u32::from(step) << (*unit).min(LARGEST_PART_UNIT)
     }
 
     /// The logarithmic curve whose code 1 is at or below `smallest`, a positive float.
@@ -167,7 +205,7 @@ impl Curve {
         match *self {
             Self::Exponential { scale }
             | Self::Display { white: scale, .. }
-            | Self::Knots { white: scale, .. } => scale,
+            | Self::Parts { white: scale, .. } => scale,
             Self::Logarithmic { .. } => Scale::ONE,
         }
     }
@@ -180,8 +218,7 @@ impl Curve {
                 mantissa: decode_fixed(byte(code)).into(),
                 exponent: -(DECODED_BITS as i32),
             },
-            Self::Display { step, .. } => display_magnitude(step.saturating_mul(code.into())),
-            Self::Knots { ref knots, .. } => display_magnitude(knot_units(knots, byte(code))),
+            Self::Display { .. } | Self::Parts { .. } => display_magnitude(self.units(code)),
             Self::Logarithmic { first } => {
                 let Some(steps) = code.checked_sub(1) else {
                     return Magnitude {
@@ -211,7 +248,7 @@ impl Curve {
     pub fn decode(&self, code: u16) -> f32 {
         match self {
             Self::Exponential { scale } => decode(byte(code)) * scale.value(),
-            Self::Display { .. } | Self::Knots { .. } | Self::Logarithmic { .. } => {
+            Self::Display { .. } | Self::Parts { .. } | Self::Logarithmic { .. } => {
                 self.magnitude(code).value() * self.factor()
             }
         }
@@ -229,17 +266,14 @@ impl Curve {
             Self::Display { white, step } => {
                 display_code(value / white.value()) * UNITS as f32 / step as f32
             }
-            Self::Knots { white, ref knots } => {
-                let units = display_code(value / white.value()) * f32::from(KNOT_UNITS);
-                let mut parts = knots.windows(2).zip(0_u16..);
-                let part = parts.find_map(|(ends, part)| match *ends {
-                    [from, to] if units < f32::from(to) => {
-                        let within = (units - f32::from(from)) / (f32::from(to) - f32::from(from));
-                        Some((f32::from(part) + within) * f32::from(KNOT_CODES))
-                    }
-                    _ => None,
-                });
-                part.unwrap_or(f32::from(last))
+            Self::Parts { white, .. } => {
+                let units = display_code(value / white.value()) * UNITS as f32;
+                let parts =
+                    (0_u8..16).take_while(|part| self.units(16 * u16::from(*part)) as f32 <= units);
+                let part = parts.last().unwrap_or(0);
+                let begin = 16 * u16::from(part);
+                let within = (units - self.units(begin) as f32) / self.part_step(part) as f32;
+                f32::from(begin) + within
             }
             Self::Logarithmic { .. } if value == 0.0 => return 0,
             Self::Logarithmic { first } => {
@@ -299,16 +333,6 @@ pub fn display_code(u: f32) -> f32 {
     } else {
         255.0 + CODES_PER_E * math::ln(u)
     }
-}
-
-/// Where a code lies between its knots, in 2^-12 display codes.
-fn knot_units(knots: &[u16; KNOTS], code: u8) -> u32 {
-    const UNITS_PER_CODE: u32 = UNITS / (KNOT_UNITS as u32 * KNOT_CODES as u32);
-    let (part, within) = (u16::from(code) / KNOT_CODES, u16::from(code) % KNOT_CODES);
-    let knot = |number: usize| u32::from(knots.get(number).copied().unwrap_or(u16::MAX));
-    let (from, to) = (knot(part.into()), knot(usize::from(part) + 1));
-    let whole = from * u32::from(KNOT_CODES) + to.saturating_sub(from) * u32::from(within);
-    whole * UNITS_PER_CODE
 }
 
 /// `f(C)` for `C` in 2^-12 display codes.

@@ -25,7 +25,8 @@ mod tables;
 use core::fmt;
 
 pub use curve::{
-    Curve, KNOT_CODES, KNOT_UNITS, KNOTS, LOG_STEPS, Magnitude, display_code, srgb_linear,
+    Curve, LARGEST_PART_FIRST, LARGEST_PART_UNIT, LOG_STEPS, Magnitude, PART_CODES, PART_STEPS,
+    PARTS, display_code, srgb_linear,
 };
 pub use exponential::{
     DECODED, DECODED_BITS, LARGEST, SATURATED, decode, decode_fixed, encode, error_bound,
@@ -39,7 +40,7 @@ pub enum Code {
     Exp8,
     /// Exponential with one scale per light, which puts its largest value on code 254.
     Exp8s,
-    /// Display steps up to a white of each light and channel, logarithmic ones above, in 16 parts of steps of their own.
+    /// Display steps up to a white of each light and channel, logarithmic ones above; 16 parts have steps of their own.
     Display8,
     /// One exponential code for the luminance; the colour is that of the light alone.
     Lum8,
