@@ -8,7 +8,7 @@ use super::{
     CountsOf, ELEMENT_BYTES, FACE_BYTES, HEADER_BYTES, LARGEST_TILE_CODE, LIGHT_BYTES, MAGIC,
     NO_LIGHT, NOT_MEASURED, Quantity, SURFACE_BYTES, VERSION, WorstError, checksum,
 };
-use crate::code::{Code, Curve, Scale};
+use crate::code::{AllCodes, Code, Curve, ExponentialCodes, Known, Scale};
 use crate::color::{Reflectance, Rgb};
 use crate::geometry::Polygon;
 use crate::mesh::Side;
@@ -36,7 +36,7 @@ impl<'a> Atlas<'a> {
     /// # Errors
     /// [`AtlasError`]: what is wrong with the bytes.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, AtlasError> {
-        let (atlas, mesh) = Self::parse_parts(bytes)?;
+        let (atlas, mesh) = Self::parse_parts::<AllCodes>(bytes)?;
         if let Some(mesh) = mesh {
             mesh.check(atlas.counts.lights)?;
         }
@@ -48,11 +48,22 @@ impl<'a> Atlas<'a> {
     /// # Errors
     /// [`AtlasError`]: what is wrong with the bytes before the mesh, or with all of them by their checksum.
     pub fn parse_codes(bytes: &'a [u8]) -> Result<Self, AtlasError> {
-        Ok(Self::parse_parts(bytes)?.0)
+        Ok(Self::parse_parts::<AllCodes>(bytes)?.0)
+    }
+
+    /// The same for an atlas in exponential codes only, by a reader that knows no others.
+    ///
+    /// # Errors
+    /// [`AtlasError`], as above, and for lights in other codes.
+    #[inline(never)]
+    pub fn parse_exponential(bytes: &'a [u8]) -> Result<Self, AtlasError> {
+        Ok(Self::parse_parts::<ExponentialCodes>(bytes)?.0)
     }
 
     /// The atlas without its mesh, and the mesh, not checked yet.
-    fn parse_parts(bytes: &'a [u8]) -> Result<(Self, Option<AtlasMesh<'a>>), AtlasError> {
+    fn parse_parts<K: Known>(
+        bytes: &'a [u8],
+    ) -> Result<(Self, Option<AtlasMesh<'a>>), AtlasError> {
         let header = Header::parse(bytes)?;
         let counts = header.counts;
         // Else any number of elements would fit into a file of no size.
@@ -66,7 +77,8 @@ impl<'a> Atlas<'a> {
         let lights = bytes.get(HEADER_BYTES..lights as usize).unwrap_or_default();
         let (mut stride, mut is_tiled) = (0, false);
         for tag in 0..counts.lights {
-            let code = code_at(lights, tag).ok_or(AtlasError::Illegal("code"))?;
+            let code = code_at(lights, tag).filter(|code| K::knows(*code));
+            let code = code.ok_or(AtlasError::Illegal("code"))?;
             stride += code.bytes();
             is_tiled |= code.is_tiled();
         }
@@ -98,7 +110,7 @@ impl<'a> Atlas<'a> {
         if tiles.is_empty() == is_tiled {
             return Err(AtlasError::Illegal("table of tiles"));
         }
-        let tiles = is_tiled.then(|| Tiles::parse(tiles, counts.elements));
+        let tiles = (K::TILES && is_tiled).then(|| Tiles::parse(tiles, counts.elements));
         let atlas = Self {
             quantity: header.quantity,
             image_width: header.image_width,
@@ -111,7 +123,7 @@ impl<'a> Atlas<'a> {
             tiles: tiles.transpose()?,
             mesh: None,
         };
-        atlas.check_lights()?;
+        atlas.check_lights::<K>()?;
         let mesh = (counts.faces > 0).then(|| AtlasMesh {
             surfaces: part(needed.surfaces, needed.faces),
             faces: part(needed.faces, needed.elements),
@@ -120,10 +132,15 @@ impl<'a> Atlas<'a> {
         Ok((atlas, mesh))
     }
 
-    fn check_lights(&self) -> Result<(), AtlasError> {
+    fn check_lights<K: Known>(&self) -> Result<(), AtlasError> {
         let mut named = 0_usize;
         for tag in 0..self.counts.lights {
             let record = LightRecord::parse(record(self.lights, tag, LIGHT_BYTES));
+            let reaches = |record: &LightRecord| {
+                let mut curves = record.curves.iter().zip(record.last);
+                curves.all(|(curve, last)| curve.reaches::<K>(last))
+            };
+            let record = record.filter(reaches);
             let record = record.ok_or(AtlasError::Illegal("light"))?;
             if record.error.is_some() != self.worst_error.is_some() {
                 return Err(AtlasError::Illegal("error of a light"));
@@ -543,7 +560,7 @@ fn curve(code: Code, input: &mut Input) -> Option<(Curve, u16)> {
     } else {
         last == u16::from(u8::MAX)
     };
-    (is_legal && curve.reaches(last)).then_some((curve, last))
+    is_legal.then_some((curve, last))
 }
 
 /// The code of light `tag` of a table of lights; `None` when there is no such code.

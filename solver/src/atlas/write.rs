@@ -4,7 +4,7 @@ use super::{
     AtlasError, CHECKSUM_AT, CountsOf, HEADER_BYTES, LARGEST_TILE_CODE, MAGIC, NO_LIGHT,
     NOT_MEASURED, Quantity, VERSION, WorstError, checksum,
 };
-use crate::code::{Code, Curve, Scale};
+use crate::code::{AllCodes, Code, Curve, Scale};
 use crate::color::Rgb;
 use crate::geometry::Polygon;
 use crate::mesh::{Mesh, Side};
@@ -249,7 +249,7 @@ fn put_curve(code: Code, curve: Curve, last: u16, output: &mut Output) -> Result
     } else {
         last == u16::from(u8::MAX)
     };
-    if !is_legal || !curve.reaches(last) {
+    if !is_legal || !curve.reaches::<AllCodes>(last) {
         return Err(AtlasError::Unfit(
             "a contribution beyond its code; change the emission",
         ));

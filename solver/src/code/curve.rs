@@ -23,7 +23,7 @@
 
 use super::scale::Scale;
 use super::tables::{POWERS, SRGB};
-use super::{DECODED_BITS, decode, decode_fixed, encode, error_bound};
+use super::{DECODED_BITS, Known, decode, decode_fixed, encode, error_bound};
 use crate::math;
 
 /// Steps of the logarithmic code in an octave.
@@ -178,8 +178,8 @@ impl Curve {
 
     /// Whether a code has a value below 2^127, and so has its [`Self::magnitude`]; without floats.
     #[must_use]
-    pub fn reaches(&self, code: u16) -> bool {
-        let (value, scale) = (self.magnitude(code), self.scale());
+    pub fn reaches<K: Known>(&self, code: u16) -> bool {
+        let (value, scale) = (K::magnitude(self, code), self.scale());
         let octave = |mantissa: u64, exponent: i32| 64 - mantissa.leading_zeros() as i32 + exponent;
         let product = u64::from(value.mantissa) * u64::from(scale.mantissa());
         octave(value.mantissa.into(), value.exponent) <= 127

@@ -17,7 +17,9 @@ use core::num::NonZeroUsize;
 
 use super::{RelightError, Wide, check_lights};
 use crate::atlas::{Atlas, AtlasLight, Block, LARGEST_SIDE, Tiles};
-use crate::code::{Curve, DECODED, DECODED_BITS, Magnitude, Scale};
+use crate::code::{
+    AllCodes, Curve, DECODED, DECODED_BITS, ExponentialCodes, Known, Magnitude, Scale,
+};
 use crate::color::Rgb;
 
 /// Linear steps from black up that a display encodes.
@@ -113,8 +115,8 @@ pub struct Values {
 }
 
 impl Values {
-    pub(super) fn new(curve: Curve, last: u16) -> Self {
-        let largest = curve.magnitude(last);
+    pub(super) fn new<K: Known>(curve: Curve, last: u16) -> Self {
+        let largest = K::magnitude(&curve, last);
         let excess = 16 - largest.mantissa.leading_zeros() as i32;
         Self {
             curve,
@@ -125,7 +127,7 @@ impl Values {
 
     /// Calls `f` with one entry and value after the other, from code 0 on.
     #[inline(always)]
-    pub(super) fn with_codes<E>(
+    pub(super) fn with_codes<K: Known, E>(
         &self,
         entries: impl Iterator<Item = E>,
         mut f: impl FnMut(E, u32),
@@ -136,14 +138,14 @@ impl Values {
             }
         } else {
             for (entry, code) in entries.zip(0..) {
-                f(entry, self.of(code));
+                f(entry, self.of::<K>(code));
             }
         }
     }
 
     /// Below 2^16.
-    pub(super) fn of(&self, code: u16) -> u32 {
-        let value = self.curve.magnitude(code.min(self.last));
+    pub(super) fn of<K: Known>(&self, code: u16) -> u32 {
+        let value = K::magnitude(&self.curve, code.min(self.last));
         let shift = self.exponent - value.exponent;
         let distance = shift.unsigned_abs();
         if shift < 0 {
@@ -190,6 +192,30 @@ impl<'a> FrameMix<'a> {
         full: &[Rgb],
         lights: &'a mut [FrameLight],
     ) -> Result<Self, RelightError> {
+        Self::fit::<AllCodes>(atlas, full, lights)
+    }
+
+    /// The same for an atlas in exponential codes only, by a program that knows no others.
+    ///
+    /// # Errors
+    /// As above, and [`RelightError::Code`] for lights in other codes.
+    #[inline(never)]
+    pub fn exponential(
+        atlas: &Atlas,
+        full: &[Rgb],
+        lights: &'a mut [FrameLight],
+    ) -> Result<Self, RelightError> {
+        Self::fit::<ExponentialCodes>(atlas, full, lights)
+    }
+
+    fn fit<K: Known>(
+        atlas: &Atlas,
+        full: &[Rgb],
+        lights: &'a mut [FrameLight],
+    ) -> Result<Self, RelightError> {
+        if !atlas.is_all_in(K::knows) {
+            return Err(RelightError::Code);
+        }
         super::check_mix(atlas, full)?;
         check_lights(atlas, lights.len())?;
         if full.len() > 1000 {
@@ -203,14 +229,14 @@ impl<'a> FrameMix<'a> {
             let values = light.curves.iter().zip(light.last);
             let channels = mix.full_scale.iter_mut().zip(full.to_array()).zip(values);
             for ((scale, full), (curve, last)) in channels {
-                let values = Values::new(*curve, last);
-                let largest = Wide::new(values.of(last).into(), 0);
+                let values = Values::new::<K>(*curve, last);
+                let largest = Wide::new(values.of::<K>(last).into(), 0);
                 *scale = scale.plus(unit(full, curve.scale(), &values).times(largest));
             }
         }
-        mix.fill_gains(atlas, full);
+        mix.fill_gains::<K>(atlas, full);
         // With every light by itself at its largest, some element is the brightest.
-        let brightest = mix.brightest(atlas);
+        let brightest = mix.brightest::<K>(atlas);
         let room = (1 << FEWEST_BITS) - 2 - full.len() as u32 / 2;
         for (scale, brightest) in mix.full_scale.iter_mut().zip(brightest) {
             let brightest = u64::from(brightest) + full.len() as u64;
@@ -218,12 +244,12 @@ impl<'a> FrameMix<'a> {
             let fits = grown.over(Wide::new(room.into(), 0));
             *scale = scale.times(fits);
         }
-        mix.fill_gains(atlas, full);
+        mix.fill_gains::<K>(atlas, full);
         Ok(mix)
     }
 
     /// Gains at the present full scale; levels become 0.
-    fn fill_gains(&mut self, atlas: &Atlas, full: &[Rgb]) {
+    fn fill_gains<K: Known>(&mut self, atlas: &Atlas, full: &[Rgb]) {
         let entries = self.lights.iter_mut().zip(atlas.lights()).zip(full);
         for ((entry, light), full) in entries {
             *entry = FrameLight::EMPTY;
@@ -231,17 +257,17 @@ impl<'a> FrameMix<'a> {
             let channels = entry.gains.iter_mut().zip(self.full_scale);
             for (((gain, scale), full), (curve, last)) in channels.zip(full.to_array()).zip(values)
             {
-                let values = Values::new(*curve, last);
+                let values = Values::new::<K>(*curve, last);
                 *gain = Gain::new(unit(full, curve.scale(), &values).over(scale).scaled(-BITS));
             }
         }
     }
 
     /// The largest sum of every channel with all lights at their full weights, in 2^-16 of the full scale.
-    fn brightest(&self, atlas: &Atlas) -> [u32; 3] {
-        let mut brightest = self.brightest_of_rows(atlas);
-        if let Some(tiles) = atlas.tiles() {
-            let in_tiles = self.brightest_of_tiles(atlas, &tiles);
+    fn brightest<K: Known>(&self, atlas: &Atlas) -> [u32; 3] {
+        let mut brightest = self.brightest_of_rows::<K>(atlas);
+        if let Some(tiles) = atlas.tiles().filter(|_| K::TILES) {
+            let in_tiles = self.brightest_of_tiles::<K>(atlas, &tiles);
             // No element has more of both.
             for (sum, other) in brightest.iter_mut().zip(in_tiles) {
                 *sum += other;
@@ -252,7 +278,7 @@ impl<'a> FrameMix<'a> {
 
     /// Of the lights in tiles. Its stack of 5 KB is its own.
     #[inline(never)]
-    fn brightest_of_tiles(&self, atlas: &Atlas, tiles: &Tiles) -> [u32; 3] {
+    fn brightest_of_tiles<K: Known>(&self, atlas: &Atlas, tiles: &Tiles) -> [u32; 3] {
         let mut brightest = [0; 3];
         let mut block: Block = [[0; 3]; LARGEST_SIDE * LARGEST_SIDE];
         for (place, mut bits) in tiles.iter() {
@@ -260,12 +286,12 @@ impl<'a> FrameMix<'a> {
             let lights = atlas.lights().zip(self.lights.iter());
             for (light, entry) in lights.filter(|(light, _)| light.code.is_tiled()) {
                 if bits.next_light(place, light.last, &mut block) {
-                    let terms = entry.full_terms(&light);
+                    let terms = entry.full_terms::<K>(&light);
                     for (sums, codes) in sums.iter_mut().zip(&block).take(place.len()) {
                         for ((sum, (weight, values)), code) in
                             sums.iter_mut().zip(&terms).zip(codes)
                         {
-                            *sum += weight.of(values.of(*code));
+                            *sum += weight.of(values.of::<K>(*code));
                         }
                     }
                 }
@@ -276,7 +302,7 @@ impl<'a> FrameMix<'a> {
     }
 
     /// Of the lights that are not in tiles.
-    fn brightest_of_rows(&self, atlas: &Atlas) -> [u32; 3] {
+    fn brightest_of_rows<K: Known>(&self, atlas: &Atlas) -> [u32; 3] {
         let stride = atlas
             .lights()
             .map(|light| light.code.bytes())
@@ -290,7 +316,7 @@ impl<'a> FrameMix<'a> {
             let mut rest = rows;
             let lights = atlas.lights().zip(self.lights.iter());
             for (light, entry) in lights.filter(|(light, _)| !light.code.is_tiled()) {
-                let terms = entry.full_terms(&light);
+                let terms = entry.full_terms::<K>(&light);
                 let mut codes = rest.chunks(stride.get());
                 for (sums, codes) in sums.iter_mut().zip(&mut codes) {
                     let codes = match (light.code.bytes(), codes) {
@@ -299,7 +325,7 @@ impl<'a> FrameMix<'a> {
                         _ => [0; 3],
                     };
                     for ((sum, (weight, values)), code) in sums.iter_mut().zip(&terms).zip(codes) {
-                        *sum += weight.of(values.of(code.into()));
+                        *sum += weight.of(values.of::<K>(code.into()));
                     }
                 }
                 rest = rest.get(light.code.bytes()..).unwrap_or_default();
@@ -323,7 +349,7 @@ impl<'a> FrameMix<'a> {
     }
 
     /// What the codes of a light contribute to sums of so many bits.
-    pub(super) fn terms(
+    pub(super) fn terms<K: Known>(
         &self,
         atlas: &Atlas,
         light: u32,
@@ -333,7 +359,7 @@ impl<'a> FrameMix<'a> {
         let entry = self.lights.get(light as usize);
         let found = entry.zip(atlas.curves(light));
         let (entry, (curves, last)) = found.ok_or(RelightError::Lights { expected })?;
-        Ok(entry.terms(curves, last, bits))
+        Ok(entry.terms::<K>(curves, last, bits))
     }
 }
 
@@ -341,24 +367,24 @@ impl<'a> FrameMix<'a> {
 pub type Terms = [(Weight, Values); 3];
 
 impl FrameLight {
-    fn terms(&self, curves: [Curve; 3], last: [u16; 3], bits: [u32; 3]) -> Terms {
+    fn terms<K: Known>(&self, curves: [Curve; 3], last: [u16; 3], bits: [u32; 3]) -> Terms {
         let ([r, g, b], [last_r, last_g, last_b]) = (curves, last);
         let ([gain_r, gain_g, gain_b], [level_r, level_g, level_b]) = (self.gains, self.levels);
         let [bits_r, bits_g, bits_b] = bits;
         [
-            (gain_r.weight(level_r, bits_r), Values::new(r, last_r)),
-            (gain_g.weight(level_g, bits_g), Values::new(g, last_g)),
-            (gain_b.weight(level_b, bits_b), Values::new(b, last_b)),
+            (gain_r.weight(level_r, bits_r), Values::new::<K>(r, last_r)),
+            (gain_g.weight(level_g, bits_g), Values::new::<K>(g, last_g)),
+            (gain_b.weight(level_b, bits_b), Values::new::<K>(b, last_b)),
         ]
     }
 
     /// At the full weight, in 2^-16 of the full scale.
-    fn full_terms(&self, light: &AtlasLight) -> Terms {
+    fn full_terms<K: Known>(&self, light: &AtlasLight) -> Terms {
         let full = Self {
             levels: [u16::MAX; 3],
             ..*self
         };
-        full.terms(light.curves, light.last, [BITS as u32; 3])
+        full.terms::<K>(light.curves, light.last, [BITS as u32; 3])
     }
 }
 
@@ -400,6 +426,7 @@ impl<'a, T: Encode> Finish<'a, T> {
     /// # Errors
     /// [`RelightError::Elements`]; [`RelightError::Range`] for an exposure that is not positive and finite, or under which an
     /// element may show brighter than the last of the [`STEPS`]: take a table with a lower white.
+    #[inline(never)]
     pub fn new(
         atlas: &Atlas,
         mix: &FrameMix,

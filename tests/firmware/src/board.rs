@@ -19,6 +19,7 @@ pub fn exit(status: u32) -> ! {
 }
 
 /// Prints `name value`.
+#[inline(never)]
 pub fn say(name: &core::ffi::CStr, value: u32) {
     let mut digits = *b" 0x00000000\n\0";
     let places = digits.iter_mut().skip(3).take(8);
