@@ -51,7 +51,8 @@ impl<'a> Atlas<'a> {
         Ok(Self::parse_parts::<AllCodes>(bytes)?.0)
     }
 
-    /// The same for an atlas in exponential codes only, by a reader that knows no others.
+    /// The same for an atlas in exponential codes only, by a reader that knows no others
+    /// and leaves the names unread: they are empty.
     ///
     /// # Errors
     /// [`AtlasError`], as above, and for lights in other codes.
@@ -94,12 +95,17 @@ impl<'a> Atlas<'a> {
         if bytes.len() as u64 > needed.end {
             return Err(AtlasError::Oversized { needed: needed.end });
         }
-        if checksum(bytes) != Some(header.checksum) {
+        if checksum::<K>(bytes) != Some(header.checksum) {
             return Err(AtlasError::Checksum);
         }
 
         let part = |from: u64, to: u64| bytes.get(from as usize..to as usize).unwrap_or_default();
-        let names = core::str::from_utf8(part(needed.names, needed.codes));
+        let names = part(needed.names, needed.codes);
+        let names = if K::ONLY_EXPONENTIAL {
+            Ok("")
+        } else {
+            core::str::from_utf8(names)
+        };
         let tiles = part(needed.tiles, needed.surfaces);
         let is_image = header.image_width > 0;
         if is_image
@@ -110,7 +116,7 @@ impl<'a> Atlas<'a> {
         if tiles.is_empty() == is_tiled {
             return Err(AtlasError::Illegal("table of tiles"));
         }
-        let tiles = (K::TILES && is_tiled).then(|| Tiles::parse(tiles, counts.elements));
+        let tiles = (!K::ONLY_EXPONENTIAL && is_tiled).then(|| Tiles::parse(tiles, counts.elements));
         let atlas = Self {
             quantity: header.quantity,
             image_width: header.image_width,
@@ -146,12 +152,12 @@ impl<'a> Atlas<'a> {
                 return Err(AtlasError::Illegal("error of a light"));
             }
             let end = named + usize::from(record.name_length);
-            if self.names.get(named..end).is_none() {
+            if !K::ONLY_EXPONENTIAL && self.names.get(named..end).is_none() {
                 return Err(AtlasError::Illegal("light name"));
             }
             named = end;
         }
-        if named == self.names.len() {
+        if named == self.counts.names as usize {
             Ok(())
         } else {
             Err(AtlasError::Illegal("light name"))
@@ -194,7 +200,8 @@ impl<'a> Atlas<'a> {
         let (lights, mut names) = (self.lights, self.names);
         (0..self.counts.lights).filter_map(move |tag| {
             let record = LightRecord::parse(record(lights, tag, LIGHT_BYTES))?;
-            let (name, rest) = names.split_at_checked(usize::from(record.name_length))?;
+            let named = names.split_at_checked(usize::from(record.name_length));
+            let (name, rest) = named.unwrap_or_default();
             names = rest;
             Some(AtlasLight {
                 name,

@@ -143,7 +143,7 @@ pub fn write(
         mesh_parts(surfaces, mesh, &mut output)?;
     }
 
-    let sum = checksum(bytes).ok_or(AtlasError::Full { needed })?;
+    let sum = checksum::<AllCodes>(bytes).ok_or(AtlasError::Full { needed })?;
     let mut place = Output {
         rest: bytes.get_mut(CHECKSUM_AT..).unwrap_or_default(),
     };

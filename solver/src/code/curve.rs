@@ -23,7 +23,8 @@
 
 use super::scale::Scale;
 use super::tables::{POWERS, SRGB};
-use super::{DECODED_BITS, Known, decode, decode_fixed, encode, error_bound};
+use super::known::exponential;
+use super::{Known, decode, encode, error_bound};
 use crate::math;
 
 /// Steps of the logarithmic code in an octave.
@@ -154,10 +155,7 @@ impl Curve {
     #[must_use]
     pub fn magnitude(&self, code: u16) -> Magnitude {
         match *self {
-            Self::Exponential { .. } => Magnitude {
-                mantissa: decode_fixed(byte(code)).into(),
-                exponent: -(DECODED_BITS as i32),
-            },
+            Self::Exponential { .. } => exponential(code),
             Self::Display { first, step, .. } => {
                 let units = u64::from(first) + u64::from(step) * u64::from(code);
                 display_magnitude(u32::try_from(units).unwrap_or(u32::MAX))

@@ -132,7 +132,8 @@ impl Values {
         entries: impl Iterator<Item = E>,
         mut f: impl FnMut(E, u32),
     ) {
-        if matches!(self.curve, Curve::Exponential { .. }) && self.exponent == EXPONENTIAL {
+        let is_exponential = matches!(self.curve, Curve::Exponential { .. });
+        if K::ONLY_EXPONENTIAL || is_exponential && self.exponent == EXPONENTIAL {
             for (entry, value) in entries.zip(&DECODED) {
                 f(entry, u32::from(*value));
             }
@@ -146,6 +147,10 @@ impl Values {
     /// Below 2^16.
     pub(super) fn of<K: Known>(&self, code: u16) -> u32 {
         let value = K::magnitude(&self.curve, code.min(self.last));
+        if K::ONLY_EXPONENTIAL {
+            // They have 16 bits already.
+            return value.mantissa;
+        }
         let shift = self.exponent - value.exponent;
         let distance = shift.unsigned_abs();
         if shift < 0 {
@@ -266,7 +271,7 @@ impl<'a> FrameMix<'a> {
     /// The largest sum of every channel with all lights at their full weights, in 2^-16 of the full scale.
     fn brightest<K: Known>(&self, atlas: &Atlas) -> [u32; 3] {
         let mut brightest = self.brightest_of_rows::<K>(atlas);
-        if let Some(tiles) = atlas.tiles().filter(|_| K::TILES) {
+        if let Some(tiles) = atlas.tiles().filter(|_| !K::ONLY_EXPONENTIAL) {
             let in_tiles = self.brightest_of_tiles::<K>(atlas, &tiles);
             // No element has more of both.
             for (sum, other) in brightest.iter_mut().zip(in_tiles) {
@@ -333,6 +338,18 @@ impl<'a> FrameMix<'a> {
             keep_largest(&mut brightest, &sums);
         }
         brightest
+    }
+
+    /// The gains of [`Finish`]; `None` where its error is [`RelightError::Range`].
+    #[inline(never)]
+    fn shown(&self, runs: &[Run], exposure: f32, white: u16) -> Option<[Gain; 3]> {
+        let is_positive = (1..0x7f80_0000).contains(&exposure.to_bits());
+        let white = Wide::new(white.into(), -(STEPS.ilog2() as i32));
+        let shown = Wide::from_float(exposure).times(Wide::from_float(FRAC_1_PI));
+        let shown = shown.times(white);
+        let gains = self.full_scale.map(|scale| Gain::new(shown.times(scale)));
+        let fits = runs.iter().all(|run| factors(gains, run).is_some());
+        (is_positive && fits).then_some(gains)
     }
 
     /// Sets the levels of a light: shares of its full weight, 2^-16 each; without such a light nothing happens.
@@ -434,49 +451,15 @@ impl<'a, T: Encode> Finish<'a, T> {
         exposure: f32,
         tone: &'a T,
     ) -> Result<Self, RelightError> {
-        let is_positive = (1..0x7f80_0000).contains(&exposure.to_bits());
-        let white = Wide::new(tone.white().into(), -(STEPS.ilog2() as i32));
-        let shown = Wide::from_float(exposure).times(Wide::from_float(FRAC_1_PI));
-        let gains = mix.full_scale.map(|scale| {
-            let gain = shown.times(white).times(scale);
-            Gain::new(gain)
-        });
-        let finish = Self { runs, gains, tone };
-        finish.check(atlas.element_count() as usize)?;
-        let fits = runs.iter().all(|run| finish.factors(run).is_some());
-        if is_positive && fits {
-            Ok(finish)
-        } else {
-            Err(RelightError::Range)
-        }
-    }
-
-    /// What multiplies the sums of a run, in 2^-16 steps of 2^-11 of the full scale; `None` beyond 16 bits.
-    fn factors(&self, run: &Run) -> Option<[u16; 3]> {
-        let ([r, g, b], [gain_r, gain_g, gain_b]) = (run.reflectance, self.gains);
-        let factor = |reflectance: u16, gain: Gain| {
-            let product = u32::from(gain.mantissa) * u32::from(reflectance);
-            // Between 0 and 31 for everything that fits and does not vanish.
-            match u32::try_from(-i32::from(gain.exponent)) {
-                Ok(shift @ 0..=31) => u16::try_from(product >> shift).ok(),
-                Ok(_) => Some(0),
-                Err(_) => (product == 0).then_some(0),
-            }
-        };
-        Some([factor(r, gain_r)?, factor(g, gain_g)?, factor(b, gain_b)?])
+        check_runs(runs, atlas.element_count() as usize)?;
+        let gains = mix.shown(runs, exposure, tone.white());
+        let gains = gains.ok_or(RelightError::Range)?;
+        Ok(Self { runs, gains, tone })
     }
 
     /// Whether the runs are so many elements.
     pub(super) fn check(&self, elements: usize) -> Result<(), RelightError> {
-        let mut runs = self.runs.iter();
-        let left = runs.try_fold(elements, |left, run| {
-            left.checked_sub(run.elements as usize)
-        });
-        let expected = elements as u32;
-        match left {
-            Some(0) => Ok(()),
-            _ => Err(RelightError::Elements { expected }),
-        }
+        check_runs(self.runs, elements)
     }
 
     /// Calls `f` with the pixels of every run and what multiplies their sums.
@@ -486,12 +469,43 @@ impl<'a, T: Encode> Finish<'a, T> {
         mut pixels: &mut [T::Pixel],
         mut f: impl FnMut(&mut [T::Pixel], [u16; 3]),
     ) -> Result<(), RelightError> {
-        self.check(pixels.len())?;
+        check_runs(self.runs, pixels.len())?;
         for run in self.runs {
             let own = pixels.split_off_mut(..run.elements as usize);
-            let factors = self.factors(run).unwrap_or_default();
+            let factors = factors(self.gains, run).unwrap_or_default();
             f(own.unwrap_or_default(), factors);
         }
         Ok(())
+    }
+}
+
+/// What multiplies the sums of a run, in 2^-16 steps of 2^-11 of the full scale; `None` beyond 16 bits.
+#[inline(never)]
+fn factors(gains: [Gain; 3], run: &Run) -> Option<[u16; 3]> {
+    let mut factors = [0; 3];
+    let channels = factors.iter_mut().zip(gains).zip(run.reflectance);
+    for ((factor, gain), reflectance) in channels {
+        let product = u32::from(gain.mantissa) * u32::from(reflectance);
+        // Between 0 and 31 for everything that fits and does not vanish.
+        *factor = match u32::try_from(-i32::from(gain.exponent)) {
+            Ok(shift @ 0..=31) => u16::try_from(product >> shift).ok()?,
+            Ok(_) => 0,
+            Err(_) if product == 0 => 0,
+            Err(_) => return None,
+        };
+    }
+    Some(factors)
+}
+
+/// Whether the runs are so many elements.
+#[inline(never)]
+pub(super) fn check_runs(runs: &[Run], elements: usize) -> Result<(), RelightError> {
+    let left = runs.iter().try_fold(elements, |left, run| {
+        left.checked_sub(run.elements as usize)
+    });
+    let expected = elements as u32;
+    match left {
+        Some(0) => Ok(()),
+        _ => Err(RelightError::Elements { expected }),
     }
 }
