@@ -376,23 +376,33 @@ impl<'a> FrameMix<'a> {
         let entry = self.lights.get(light as usize);
         let found = entry.zip(atlas.curves(light));
         let (entry, (curves, last)) = found.ok_or(RelightError::Lights { expected })?;
-        Ok(entry.terms::<K>(curves, last, bits))
+        Ok(with_values::<K>(entry.weights(bits), curves, last))
     }
 }
 
 /// What the codes of a light contribute, by channel.
 pub type Terms = [(Weight, Values); 3];
 
+fn with_values<K: Known>(weights: [Weight; 3], curves: [Curve; 3], last: [u16; 3]) -> Terms {
+    let ([r, g, b], [curve_r, curve_g, curve_b]) = (weights, curves);
+    let [last_r, last_g, last_b] = last;
+    [
+        (r, Values::new::<K>(curve_r, last_r)),
+        (g, Values::new::<K>(curve_g, last_g)),
+        (b, Values::new::<K>(curve_b, last_b)),
+    ]
+}
+
 impl FrameLight {
-    fn terms<K: Known>(&self, curves: [Curve; 3], last: [u16; 3], bits: [u32; 3]) -> Terms {
-        let ([r, g, b], [last_r, last_g, last_b]) = (curves, last);
-        let ([gain_r, gain_g, gain_b], [level_r, level_g, level_b]) = (self.gains, self.levels);
-        let [bits_r, bits_g, bits_b] = bits;
-        [
-            (gain_r.weight(level_r, bits_r), Values::new::<K>(r, last_r)),
-            (gain_g.weight(level_g, bits_g), Values::new::<K>(g, last_g)),
-            (gain_b.weight(level_b, bits_b), Values::new::<K>(b, last_b)),
-        ]
+    /// What multiplies the values of the codes.
+    #[inline(never)]
+    fn weights(&self, bits: [u32; 3]) -> [Weight; 3] {
+        let mut weights = [Weight::ZERO; 3];
+        let channels = weights.iter_mut().zip(self.gains);
+        for ((weight, gain), (level, bits)) in channels.zip(self.levels.iter().zip(bits)) {
+            *weight = gain.weight(*level, bits);
+        }
+        weights
     }
 
     /// At the full weight, in 2^-16 of the full scale.
@@ -401,7 +411,7 @@ impl FrameLight {
             levels: [u16::MAX; 3],
             ..*self
         };
-        full.terms::<K>(light.curves, light.last, [BITS as u32; 3])
+        with_values::<K>(full.weights([BITS as u32; 3]), light.curves, light.last)
     }
 }
 
@@ -482,19 +492,17 @@ impl<'a, T: Encode> Finish<'a, T> {
 /// What multiplies the sums of a run, in 2^-16 steps of 2^-11 of the full scale; `None` beyond 16 bits.
 #[inline(never)]
 fn factors(gains: [Gain; 3], run: &Run) -> Option<[u16; 3]> {
-    let mut factors = [0; 3];
-    let channels = factors.iter_mut().zip(gains).zip(run.reflectance);
-    for ((factor, gain), reflectance) in channels {
+    let ([r, g, b], [gain_r, gain_g, gain_b]) = (run.reflectance, gains);
+    let factor = |reflectance: u16, gain: Gain| {
         let product = u32::from(gain.mantissa) * u32::from(reflectance);
         // Between 0 and 31 for everything that fits and does not vanish.
-        *factor = match u32::try_from(-i32::from(gain.exponent)) {
-            Ok(shift @ 0..=31) => u16::try_from(product >> shift).ok()?,
-            Ok(_) => 0,
-            Err(_) if product == 0 => 0,
-            Err(_) => return None,
-        };
-    }
-    Some(factors)
+        match u32::try_from(-i32::from(gain.exponent)) {
+            Ok(shift @ 0..=31) => u16::try_from(product >> shift).ok(),
+            Ok(_) => Some(0),
+            Err(_) => (product == 0).then_some(0),
+        }
+    };
+    Some([factor(r, gain_r)?, factor(g, gain_g)?, factor(b, gain_b)?])
 }
 
 /// Whether the runs are so many elements.

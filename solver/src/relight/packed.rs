@@ -141,7 +141,8 @@ impl Form for Lum {
 
     #[inline(always)]
     fn steps(sum: u32, factors: [u16; 3]) -> [u32; 3] {
-        let [r, g, b] = factors.map(u32::from);
+        let [r, g, b] = factors;
+        let (r, g, b) = (u32::from(r), u32::from(g), u32::from(b));
         // Products of 10 or 12 bits and 16; steps of 11.
         [
             ((sum >> 22) * r) >> 15,
@@ -212,13 +213,9 @@ impl Form for Colour {
 
     #[inline(always)]
     fn steps(sum: [u16; 3], factors: [u16; 3]) -> [u32; 3] {
-        let ([r, g, b], [factor_r, factor_g, factor_b]) =
-            (sum.map(u32::from), factors.map(u32::from));
-        [
-            (r * factor_r) >> 21,
-            (g * factor_g) >> 21,
-            (b * factor_b) >> 21,
-        ]
+        let ([r, g, b], [factor_r, factor_g, factor_b]) = (sum, factors);
+        let step = |sum: u16, factor: u16| (u32::from(sum) * u32::from(factor)) >> 21;
+        [step(r, factor_r), step(g, factor_g), step(b, factor_b)]
     }
 }
 
