@@ -37,7 +37,7 @@ mod write;
 use core::fmt;
 
 use crate::code::Known;
-use crc::{NoTable, CRC_32_ISO_HDLC, Crc};
+use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use glam::Vec2;
 
 pub use read::{Atlas, AtlasMesh};

@@ -62,9 +62,7 @@ impl<'a> Atlas<'a> {
     }
 
     /// The atlas without its mesh, and the mesh, not checked yet.
-    fn parse_parts<K: Known>(
-        bytes: &'a [u8],
-    ) -> Result<(Self, Option<AtlasMesh<'a>>), AtlasError> {
+    fn parse_parts<K: Known>(bytes: &'a [u8]) -> Result<(Self, Option<AtlasMesh<'a>>), AtlasError> {
         let header = Header::parse(bytes)?;
         let counts = header.counts;
         // Else any number of elements would fit into a file of no size.
@@ -116,7 +114,8 @@ impl<'a> Atlas<'a> {
         if tiles.is_empty() == is_tiled {
             return Err(AtlasError::Illegal("table of tiles"));
         }
-        let tiles = (!K::ONLY_EXPONENTIAL && is_tiled).then(|| Tiles::parse(tiles, counts.elements));
+        let tiles =
+            (!K::ONLY_EXPONENTIAL && is_tiled).then(|| Tiles::parse(tiles, counts.elements));
         let atlas = Self {
             quantity: header.quantity,
             image_width: header.image_width,
@@ -212,6 +211,12 @@ impl<'a> Atlas<'a> {
                 error: record.error,
             })
         })
+    }
+
+    /// What a light is packed in; `None` without such a light.
+    #[must_use]
+    pub fn code(&self, light: u32) -> Option<Code> {
+        code_at(self.lights, light)
     }
 
     /// What the codes of a light stand for, and the largest of each channel; `None` without such a light.

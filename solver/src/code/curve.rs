@@ -21,9 +21,9 @@
 //! 0.83 % for 256 lights. (A decoded `f32` below 2^-141 is rounded to the grid of subnormal floats, which is
 //! coarser than that; its [`Magnitude`] is not.)
 
+use super::known::exponential;
 use super::scale::Scale;
 use super::tables::{POWERS, SRGB};
-use super::known::exponential;
 use super::{Known, decode, encode, error_bound};
 use crate::math;
 

@@ -13,12 +13,11 @@
 //! the mantissas. Nothing here computes with floats: those that an atlas stores are taken apart bit by bit.
 
 use core::f32::consts::FRAC_1_PI;
-use core::num::NonZeroUsize;
 
 use super::{RelightError, Wide, check_lights};
-use crate::atlas::{Atlas, AtlasLight, Block, LARGEST_SIDE, Tiles};
+use crate::atlas::{Atlas, Block, LARGEST_SIDE, Tiles};
 use crate::code::{
-    AllCodes, Curve, DECODED, DECODED_BITS, ExponentialCodes, Known, Magnitude, Scale,
+    AllCodes, Code, Curve, DECODED, DECODED_BITS, ExponentialCodes, Known, Magnitude, Scale,
 };
 use crate::color::Rgb;
 
@@ -32,7 +31,7 @@ const BITS: i32 = 16;
 const EXPONENTIAL: i32 = -(DECODED_BITS as i32);
 
 /// Elements that are looked at together.
-const CHUNK: usize = 16;
+const CHUNK: usize = 8;
 
 /// The fewest bits of a sum.
 pub(super) const FEWEST_BITS: u32 = 10;
@@ -230,15 +229,9 @@ impl<'a> FrameMix<'a> {
             lights,
             full_scale: [Wide::ZERO; 3],
         };
-        for (light, full) in atlas.lights().zip(full) {
-            let values = light.curves.iter().zip(light.last);
-            let channels = mix.full_scale.iter_mut().zip(full.to_array()).zip(values);
-            for ((scale, full), (curve, last)) in channels {
-                let values = Values::new::<K>(*curve, last);
-                let largest = Wide::new(values.of::<K>(last).into(), 0);
-                *scale = scale.plus(unit(full, curve.scale(), &values).times(largest));
-            }
-        }
+        mix.for_units::<K>(atlas, full, |_, scale, unit, largest| {
+            *scale = scale.plus(unit.times(largest));
+        });
         mix.fill_gains::<K>(atlas, full);
         // With every light by itself at its largest, some element is the brightest.
         let brightest = mix.brightest::<K>(atlas);
@@ -255,15 +248,33 @@ impl<'a> FrameMix<'a> {
 
     /// Gains at the present full scale; levels become 0.
     fn fill_gains<K: Known>(&mut self, atlas: &Atlas, full: &[Rgb]) {
-        let entries = self.lights.iter_mut().zip(atlas.lights()).zip(full);
-        for ((entry, light), full) in entries {
-            *entry = FrameLight::EMPTY;
-            let values = light.curves.iter().zip(light.last);
-            let channels = entry.gains.iter_mut().zip(self.full_scale);
+        self.lights.fill(FrameLight::EMPTY);
+        self.for_units::<K>(atlas, full, |gain, scale, unit, _| {
+            *gain = Gain::new(unit.over(*scale).scaled(-BITS));
+        });
+    }
+
+    /// Calls `f` for every light and channel with its gain, the full scale, what one of its values is worth, and the
+    /// largest of them.
+    #[inline(never)]
+    fn for_units<K: Known>(
+        &mut self,
+        atlas: &Atlas,
+        full: &[Rgb],
+        f: fn(&mut Gain, &mut Wide, Wide, Wide),
+    ) {
+        let entries = self.lights.iter_mut().zip(full).zip(0..);
+        for ((entry, full), light) in entries {
+            let Some((curves, last)) = atlas.curves(light) else {
+                continue;
+            };
+            let values = curves.iter().zip(last);
+            let channels = entry.gains.iter_mut().zip(&mut self.full_scale);
             for (((gain, scale), full), (curve, last)) in channels.zip(full.to_array()).zip(values)
             {
                 let values = Values::new::<K>(*curve, last);
-                *gain = Gain::new(unit(full, curve.scale(), &values).over(scale).scaled(-BITS));
+                let largest = Wide::new(values.of::<K>(last).into(), 0);
+                f(gain, scale, unit(full, curve.scale(), &values), largest);
             }
         }
     }
@@ -291,13 +302,9 @@ impl<'a> FrameMix<'a> {
             let lights = atlas.lights().zip(self.lights.iter());
             for (light, entry) in lights.filter(|(light, _)| light.code.is_tiled()) {
                 if bits.next_light(place, light.last, &mut block) {
-                    let terms = entry.full_terms::<K>(&light);
+                    let terms = entry.full_terms::<K>((light.curves, light.last));
                     for (sums, codes) in sums.iter_mut().zip(&block).take(place.len()) {
-                        for ((sum, (weight, values)), code) in
-                            sums.iter_mut().zip(&terms).zip(codes)
-                        {
-                            *sum += weight.of(values.of::<K>(*code));
-                        }
+                        add_terms::<K>(sums, &terms, *codes);
                     }
                 }
             }
@@ -308,34 +315,33 @@ impl<'a> FrameMix<'a> {
 
     /// Of the lights that are not in tiles.
     fn brightest_of_rows<K: Known>(&self, atlas: &Atlas) -> [u32; 3] {
-        let stride = atlas
-            .lights()
-            .map(|light| light.code.bytes())
-            .sum::<usize>();
-        let Some(stride) = NonZeroUsize::new(stride) else {
-            return [0; 3];
-        };
-        let mut brightest = [0; 3];
-        for rows in atlas.codes().chunks(stride.get().saturating_mul(CHUNK)) {
+        let codes = (0..).map_while(|light| atlas.code(light));
+        let stride = codes.map(Code::bytes).sum::<usize>();
+        let (mut rows, mut brightest) = (atlas.codes(), [0; 3]);
+        while !rows.is_empty() {
             let mut sums = [[0; 3]; CHUNK];
-            let mut rest = rows;
-            let lights = atlas.lights().zip(self.lights.iter());
-            for (light, entry) in lights.filter(|(light, _)| !light.code.is_tiled()) {
-                let terms = entry.full_terms::<K>(&light);
-                let mut codes = rest.chunks(stride.get());
-                for (sums, codes) in sums.iter_mut().zip(&mut codes) {
-                    let codes = match (light.code.bytes(), codes) {
-                        (3, [r, g, b, ..]) => [*r, *g, *b],
-                        (_, [luminance, ..]) => [*luminance; 3],
-                        _ => [0; 3],
-                    };
-                    for ((sum, (weight, values)), code) in sums.iter_mut().zip(&terms).zip(codes) {
-                        *sum += weight.of(values.of::<K>(code.into()));
+            let mut begin = 0;
+            for (entry, light) in self.lights.iter().zip(0..) {
+                let found = atlas.code(light).zip(atlas.curves(light));
+                let Some((code, curves)) = found.filter(|(code, _)| !code.is_tiled()) else {
+                    continue;
+                };
+                let terms = entry.full_terms::<K>(curves);
+                let mut at = begin;
+                for sums in &mut sums {
+                    match (code.bytes(), rows.get(at..)) {
+                        (3, Some(&[r, g, b, ..])) => add_terms::<K>(sums, &terms, [r, g, b]),
+                        (_, Some(&[luminance, ..])) => {
+                            add_terms::<K>(sums, &terms, [luminance; 3]);
+                        }
+                        _ => {}
                     }
+                    at += stride;
                 }
-                rest = rest.get(light.code.bytes()..).unwrap_or_default();
+                begin += code.bytes();
             }
             keep_largest(&mut brightest, &sums);
+            rows = rows.get(CHUNK * stride..).unwrap_or_default();
         }
         brightest
     }
@@ -406,12 +412,19 @@ impl FrameLight {
     }
 
     /// At the full weight, in 2^-16 of the full scale.
-    fn full_terms<K: Known>(&self, light: &AtlasLight) -> Terms {
+    fn full_terms<K: Known>(&self, (curves, last): ([Curve; 3], [u16; 3])) -> Terms {
         let full = Self {
             levels: [u16::MAX; 3],
             ..*self
         };
-        with_values::<K>(full.weights([BITS as u32; 3]), light.curves, light.last)
+        with_values::<K>(full.weights([BITS as u32; 3]), curves, last)
+    }
+}
+
+/// Adds what the codes of a light contribute.
+fn add_terms<K: Known>(sums: &mut [u32; 3], terms: &Terms, codes: [impl Into<u16>; 3]) {
+    for ((sum, (weight, values)), code) in sums.iter_mut().zip(terms).zip(codes) {
+        *sum += weight.of(values.of::<K>(code.into()));
     }
 }
 

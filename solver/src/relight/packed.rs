@@ -456,7 +456,9 @@ impl<'a> AnyTable<'a> {
         self.0.fill(light, |channel, code| {
             let term = terms.get(channel);
             // Below the full scale.
-            term.map_or(0, |(weight, values)| weight.of(values.of::<AllCodes>(code)) as u16)
+            term.map_or(0, |(weight, values)| {
+                weight.of(values.of::<AllCodes>(code)) as u16
+            })
         });
         Ok(())
     }
