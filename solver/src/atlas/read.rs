@@ -129,7 +129,7 @@ impl<'a> Atlas<'a> {
             mesh: None,
         };
         atlas.check_lights::<K>()?;
-        let mesh = (counts.faces > 0).then(|| AtlasMesh {
+        let mesh = (!K::ONLY_EXPONENTIAL && counts.faces > 0).then(|| AtlasMesh {
             surfaces: part(needed.surfaces, needed.faces),
             faces: part(needed.faces, needed.elements),
             elements: part(needed.elements, needed.end),

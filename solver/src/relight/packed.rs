@@ -125,12 +125,12 @@ impl Form for Lum {
         let is_new = before.is_none();
         let own = table.iter_mut().filter_map(|lights| lights.get_mut(light));
         values.with_codes::<Self::Known, _>(own, |entry, value| {
-            let old = if is_new {
-                0
+            let new = pack(*r, *g, *b, value);
+            *entry = if is_new {
+                new
             } else {
-                pack(old_r, old_g, old_b, value)
+                new.wrapping_sub(pack(old_r, old_g, old_b, value))
             };
-            *entry = pack(*r, *g, *b, value).wrapping_sub(old);
         });
     }
 
@@ -342,10 +342,11 @@ impl<'a, F: Form> Sums<'a, F> {
         check_elements(atlas, sums.len())?;
         let rows = rows::<F, K>(atlas)?;
         sums.fill(F::Sum::default());
-        for light in 0..K {
-            let after = mix.terms::<F::Known>(atlas, light as u32, F::BITS)?;
+        // As many as `K`, but one copy of the loop is enough.
+        for light in 0..atlas.light_count() {
+            let after = mix.terms::<F::Known>(atlas, light, F::BITS)?;
             F::fill(table, 0, None, &after);
-            add_light::<F, K>(rows, light, table, sums);
+            add_light::<F, K>(rows, light as usize, table, sums);
         }
         Ok(Self { sums, table })
     }

@@ -115,6 +115,7 @@ pub fn ticks() -> u32 {
 const PER_TICK: (u64, u32) = (125, 11);
 
 /// Instructions in so many ticks.
+#[inline(never)]
 pub fn instructions(ticks: u32) -> u32 {
     // A factor over a power of two.
     let (factor, shift) = PER_TICK;

@@ -89,7 +89,7 @@ pub fn run_full<F: Form, const K: usize, const L: usize>(
     let finish = must(Finish::new(&atlas, &mix, input.runs, input.exposure, &TONE));
     let mut frame = |levels: &[[u16; 3]; K], table: &mut F::Table<L>, pixels: &mut [u16]| {
         set_all(&mut mix, levels);
-        for light in 0..K as u32 {
+        for light in 0..atlas.light_count() {
             must(fill_table::<F, L>(&atlas, &mix, light, table));
         }
         must(full::<F, K, L, _>(
@@ -188,7 +188,7 @@ pub fn run_any<const K: usize>(
     let mut table = must(AnyTable::new(&atlas, &mix, values));
     let cold = count(|| {
         set_all(&mut mix, &second);
-        for light in 0..K as u32 {
+        for light in 0..atlas.light_count() {
             must(table.update(&atlas, &mix, light));
         }
         must(full_any(&atlas, &table, &finish, sums, pixels));
