@@ -94,7 +94,7 @@ struct Model {
 
 const fn lum(core: Core) -> Model {
     let (element, code_of_light, code) = match core {
-        Core::M0 => (35.1, 5.0, 14_200),
+        Core::M0 => (35.1, 5.0, 13_300),
         Core::M3 => (24.6, 4.03, 20_200),
         Core::M4F => (26.0, 3.98, 20_200),
     };
@@ -112,7 +112,7 @@ const LUM_IN_BATCHES: Model = Model {
     element: 30.0,
     code_of_light: 7.05,
     light: 13_200.0,
-    code: 16_500,
+    code: 16_000,
     stack: 2_500,
 };
 

@@ -115,12 +115,16 @@ pub struct Values {
 
 impl Values {
     pub(super) fn new<K: Known>(curve: Curve, last: u16) -> Self {
-        let largest = K::magnitude(&curve, last);
-        let excess = 16 - largest.mantissa.leading_zeros() as i32;
+        let exponent = if K::ONLY_EXPONENTIAL {
+            EXPONENTIAL
+        } else {
+            let largest = K::magnitude(&curve, last);
+            largest.exponent + 16 - largest.mantissa.leading_zeros() as i32
+        };
         Self {
             curve,
             last,
-            exponent: largest.exponent + excess,
+            exponent,
         }
     }
 
@@ -146,11 +150,11 @@ impl Values {
     /// Below 2^16.
     pub(super) fn of<K: Known>(&self, code: u16) -> u32 {
         let value = K::magnitude(&self.curve, code.min(self.last));
-        if K::ONLY_EXPONENTIAL {
-            // They have 16 bits already.
-            return value.mantissa;
-        }
-        let shift = self.exponent - value.exponent;
+        let shift = if K::ONLY_EXPONENTIAL {
+            0
+        } else {
+            self.exponent - value.exponent
+        };
         let distance = shift.unsigned_abs();
         if shift < 0 {
             value.mantissa << (distance & 15)
@@ -248,7 +252,9 @@ impl<'a> FrameMix<'a> {
 
     /// Gains at the present full scale; levels become 0.
     fn fill_gains<K: Known>(&mut self, atlas: &Atlas, full: &[Rgb]) {
-        self.lights.fill(FrameLight::EMPTY);
+        for light in self.lights.iter_mut() {
+            light.levels = [0; 3];
+        }
         self.for_units::<K>(atlas, full, |gain, scale, unit, _| {
             *gain = Gain::new(unit.over(*scale).scaled(-BITS));
         });

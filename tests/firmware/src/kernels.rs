@@ -52,7 +52,8 @@ fn volatile<const K: usize>(levels: &[[u16; 3]; K]) -> [[u16; 3]; K] {
     unsafe { core::ptr::read_volatile(levels) }
 }
 
-fn set_all<const K: usize>(mix: &mut FrameMix, levels: &[[u16; 3]; K]) {
+#[inline(never)]
+fn set_all(mix: &mut FrameMix, levels: &[[u16; 3]]) {
     for (light, levels) in (0..).zip(levels) {
         mix.set(light, *levels);
     }
