@@ -38,9 +38,9 @@ pub mod mix;
 
 pub mod probe;
 
-pub mod preview;
-
 pub mod export;
+
+pub mod preview;
 
 pub mod device_cost;
 
