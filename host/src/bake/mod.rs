@@ -30,6 +30,7 @@ use crate::scene::OwnedScene;
 use crate::solution::{Solution, SolutionLight};
 
 pub use crate::solution::Method;
+pub use accuracy::{MOST_BAKES, MOST_ELEMENTS};
 pub use memory::Memory;
 pub use update::update;
 
@@ -140,8 +141,8 @@ pub enum BakeError {
     NothingLit,
     /// An update was asked for that only a whole bake can give.
     #[error(
-        "more than its lights has changed since that solution was baked, or it was not baked by \
-         --method gather; bake it again"
+        "more than its lights has changed since that solution was baked, or a lamp with a shape of its own is new, or it was \
+         not baked by --method gather; bake it again"
     )]
     OtherScene,
     /// The watcher broke before there was anything to return.

@@ -11,7 +11,7 @@ use relume::mesh::Side;
 use relume::scene::{Luminaire, Source, Surface};
 
 use super::estimate::Senders;
-use super::{BakeError, Job, Progress, Settings, bounce, estimate, solution};
+use super::{BakeError, Job, Progress, Settings, Solved, bounce, estimate, solution};
 use crate::bvh::Bvh;
 use crate::gather::Hits;
 use crate::mesh::{self, OwnedMesh};
@@ -74,7 +74,10 @@ pub fn update(
         watch,
     };
     let is_changed = |light: u32| kept[light as usize].is_none();
-    let solved = bounce::along(&mut job, mesh, &bvh, hits, is_changed)?;
+    let mut solved = bounce::along(&mut job, mesh, &bvh, hits, is_changed)?;
+    take_over(&mut solved, old, &kept);
+    let (found, residuals) = (&solved.contributions, &solved.residuals);
+    solved.errors = bounce::errors(&solved.mesh, hits, found, residuals);
     let seen = estimate::errors(
         &view,
         &solved.mesh,
@@ -82,8 +85,7 @@ pub fn update(
         &solved.contributions,
         Senders::Elements,
     );
-    let mut new = solution(scene, Method::Gather, old.spacing, solved, &seen);
-    take_over(&mut new, old, &kept);
+    let new = solution(scene, Method::Gather, old.spacing, solved, &seen);
     let changed = kept.iter().filter(|kept| kept.is_none()).count();
     Ok((new, changed))
 }
@@ -124,13 +126,12 @@ fn emitters(luminaires: &[Luminaire], mesh: &OwnedMesh, tag: u32) -> Emitters {
     }
 }
 
-/// Takes over what the old solution says of the lights that were kept.
-fn take_over(new: &mut Solution, old: &Solution, kept: &[Option<usize>]) {
-    let (count, old_count) = (new.lights.len(), old.lights.len());
+/// Takes over what the old solution has of the lights that were kept.
+fn take_over(new: &mut Solved, old: &Solution, kept: &[Option<usize>]) {
+    let (count, old_count) = (kept.len(), old.lights.len());
     for (tag, old_tag) in kept.iter().enumerate() {
         let Some(old_tag) = old_tag else { continue };
-        new.lights[tag].residual = old.lights[*old_tag].residual;
-        new.lights[tag].error = old.lights[*old_tag].error;
+        new.residuals[tag] = old.lights[*old_tag].residual;
         let copy = |to: &mut [Rgb], from: &[Rgb]| {
             let from = from.iter().skip(*old_tag).step_by(old_count);
             for (to, from) in to.iter_mut().skip(tag).step_by(count).zip(from) {
