@@ -198,6 +198,24 @@ impl Bvh {
         found
     }
 
+    /// Numbers of the surfaces whose boxes come within a distance of a polygon's, in order.
+    pub(crate) fn near(&self, polygon: &Polygon, distance: f32) -> Vec<u32> {
+        let mut bounds = Aabb::empty();
+        for vertex in polygon.vertices() {
+            bounds.extend(Vec3A::from(*vertex));
+        }
+        let margin = Vec3A::splat(distance);
+        let bounds = Aabb::new(bounds.min - margin, bounds.max + margin);
+        let mut near = Vec::new();
+        visit_leaves(
+            &self.tree,
+            |node| !node.intersect_aabb(&bounds),
+            |leaf| near.extend_from_slice(&self.surfaces[leaf]),
+        );
+        near.sort_unstable();
+        near
+    }
+
     /// What stands between two regions, looked up once for many pairs of points in them.
     #[must_use]
     pub fn narrowed(&self, shaft: &Shaft) -> Narrowed<'_> {
