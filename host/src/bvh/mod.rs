@@ -43,6 +43,7 @@ pub struct Bvh {
     facets: Facets,
     /// Surfaces on top of others.
     stacks: Stacks,
+    margin: f32,
 }
 
 impl std::fmt::Debug for Bvh {
@@ -141,7 +142,17 @@ impl Bvh {
             bodies,
             tree,
             facets: Facets::new(surfaces, farthest),
+            margin: surfaces
+                .iter()
+                .map(|surface| surface.polygon().plane().tolerance(farthest))
+                .fold(0.0, f32::max),
         }
+    }
+
+    /// By how much surfaces have grown at most for [`Caster`]s, which closes cracks between them, in m.
+    #[must_use]
+    pub const fn margin(&self) -> f32 {
+        self.margin
     }
 
     /// Casts rays for their nearest surfaces. A surface on which a ray starts is met or not as

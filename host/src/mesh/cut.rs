@@ -31,11 +31,20 @@ const TOUCH: f32 = 1e-3;
 /// The same in roundings of a coordinate: rays grow surfaces by one.
 const ROUNDINGS: f32 = 4.0;
 
+/// Sample points along an edge of an element.
+const PER_ELEMENT: f32 = 2.0;
+
 /// Most rows, and most columns, of sample points.
 const MOST_ROWS: u32 = 256;
 
 /// Rows and columns around the foot of a wall in which its sample points are joined to others.
 const AROUND: i64 = 2;
+
+/// Walks from what is walled off on a surface, one of which must come to light.
+const WALKS: u64 = 32;
+
+/// Walks that must.
+const WITNESSES: usize = 2;
 
 /// Square of the sine of the angle between two planes below which they have no line in common.
 const PARALLEL: f32 = 1e-4;
@@ -182,13 +191,21 @@ impl Cutter<'_> {
         samples.join(&mut self.bvh.caster(), &beside);
 
         let mut members: HashMap<usize, Vec<Vec3>> = HashMap::new();
-        for (point, sample) in samples.points.iter().zip(&samples.areas) {
-            members.entry(*sample).or_default().push(*point);
+        for (point, area) in samples
+            .points
+            .iter()
+            .zip(&samples.areas)
+            .take(samples.grid.len())
+        {
+            members.entry(*area).or_default().push(*point);
         }
         let mut lit = HashMap::new();
         let mut is_lit = |sample: usize| {
             let area = samples.areas[sample];
-            let light = || self.is_lit(outline, touch, &members[&area], u64::from(number));
+            let light = || {
+                let own = members.get(&area);
+                own.is_some_and(|own| self.is_lit(outline, touch, own, u64::from(number)))
+            };
             *lit.entry(area).or_insert_with(light)
         };
         let mut sides = beside.chunks_exact(2);
@@ -206,10 +223,15 @@ impl Cutter<'_> {
         let make = || Surroundings::of(self.scene, self.spacing, self.bvh).ok();
         let surroundings = self.surroundings.get_or_init(make).as_ref();
         let down = outline.normal() * height;
-        // Far apart whatever their number: a step by its golden section.
-        let step = (points.len() as f32 * 0.618) as usize + 1;
-        let place = |walk: usize| Place::new(outline, points[walk * step % points.len()] - down);
-        surroundings.is_some_and(|surroundings| surroundings.some_lead_to_light(place, seed))
+        let mut caster = self.bvh.caster();
+        surroundings.is_some_and(|surroundings| {
+            let mut walks = (0..WALKS).filter(|walk| {
+                let point = points[*walk as usize * points.len() / WALKS as usize];
+                let start = Place::new(outline, point - down);
+                surroundings.leads_to_light(&mut caster, start, seed * WALKS + walk)
+            });
+            walks.nth(WITNESSES - 1).is_some()
+        })
     }
 
     /// Feet of all walls on the front of an outline that have some of it on both sides.
@@ -292,17 +314,17 @@ struct Samples<'a> {
 }
 
 impl<'a> Samples<'a> {
-    /// A grid, about an element apart.
+    /// A grid.
     fn new(outline: &'a Polygon, element: f32, height: f32) -> Self {
-        let longest = |edge: f32| ((edge / element).ceil() as u32).clamp(1, MOST_ROWS);
+        let parts = |edge: f32| ((edge * PER_ELEMENT / element).ceil() as u32).clamp(1, MOST_ROWS);
         let length = |step: usize| {
             let edges = outline.edges().skip(step).step_by(2);
             edges.map(|(a, b)| (b - a).length()).fold(0.0, f32::max)
         };
         let mut samples = Self {
             outline,
-            columns: longest(length(0)),
-            rows: longest(length(1)),
+            columns: parts(length(0)),
+            rows: parts(length(1)),
             points: Vec::new(),
             cells: Vec::new(),
             areas: Vec::new(),
@@ -406,7 +428,11 @@ fn divided(outline: &Polygon, feet: &[Foot], least: f32) -> Vec<Polygon> {
                     (v - foot.middle).dot(across),
                     outline.plane().tolerance(v.abs().max_element()),
                 );
-                if height.abs() <= rounding { 0.0 } else { height }
+                if height.abs() <= rounding {
+                    0.0
+                } else {
+                    height
+                }
             };
             clip(&outlines[at], height).to_vec()
         });

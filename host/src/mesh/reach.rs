@@ -252,30 +252,28 @@ impl<'a> Surroundings<'a> {
 
     fn walks_lead_to_light(&self, polygon: &Polygon, part: u32) -> bool {
         let points = gauss_points(polygon);
-        let start = |walk: usize| Place::new(polygon, points[walk % points.len()].position);
-        self.some_lead_to_light(start, part.into())
+        let mut caster = self.bvh.caster();
+        let witnesses = (0..WALKS).filter(|walk| {
+            let start = Place::new(polygon, points[*walk as usize % points.len()].position);
+            self.leads_to_light(&mut caster, start, u64::from(part) * WALKS + walk)
+        });
+        witnesses.take(WITNESSES).count() == WITNESSES
     }
 
-    /// True when enough of the walks from places, `start(walk)`, come to light.
-    pub(super) fn some_lead_to_light(&self, start: impl Fn(usize) -> Place, seed: u64) -> bool {
-        let mut caster = self.bvh.caster();
-        let leads_to_light = |walk: &u64| {
-            let seed = (seed * WALKS + walk) * LONGEST_WALK;
-            let mut place = start(*walk as usize);
-            for step in 0..LONGEST_WALK {
-                let seed = (seed + step) * (2 + 4 * GLANCES);
-                if self.is_lit(&mut caster, place, seed + 2) {
-                    return true;
-                }
-                match self.next(&mut caster, place, seed) {
-                    None => return false,
-                    Some(next) => place = next,
-                }
+    /// True when a walk from a place comes to light.
+    pub(super) fn leads_to_light(&self, caster: &mut Caster, start: Place, walk: u64) -> bool {
+        let mut place = start;
+        for step in 0..LONGEST_WALK {
+            let seed = (walk * LONGEST_WALK + step) * (2 + 4 * GLANCES);
+            if self.is_lit(caster, place, seed + 2) {
+                return true;
             }
-            false
-        };
-        let witnesses = (0..WALKS).filter(leads_to_light);
-        witnesses.take(WITNESSES).count() == WITNESSES
+            match self.next(caster, place, seed) {
+                None => return false,
+                Some(next) => place = next,
+            }
+        }
+        false
     }
 
     /// Where a cosine-weighted ray ends; `None` when it escapes or is absorbed.
