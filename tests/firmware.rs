@@ -93,7 +93,8 @@ fn build(target: &str, images: &[&str], options: &str) -> Output {
     let bins = images.join(" --bin ");
     let script = format!(
         "source .ci/bare-metal.sh {target} && cd tests/firmware && \
-         cargo build --release --locked --target {target} --bin {bins} {options}"
+         cargo build --profile {} --locked --target {target} --bin {bins} {options}",
+        profile(target)
     );
     Command::new("bash")
         .args(["-c", &script])
@@ -108,11 +109,16 @@ fn build(target: &str, images: &[&str], options: &str) -> Output {
         .expect("bash")
 }
 
+/// What a target is compiled for: the small core has little flash.
+fn profile(target: &str) -> &'static str {
+    if target == SMALL { "small" } else { "release" }
+}
+
 fn image(target: &str, name: &str) -> PathBuf {
     work()
         .join("target")
         .join(target)
-        .join("release")
+        .join(profile(target))
         .join(name)
 }
 

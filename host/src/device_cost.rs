@@ -94,16 +94,16 @@ struct Model {
 
 const fn lum(core: Core) -> Model {
     let (element, code_of_light, code) = match core {
-        Core::M0 => (35.1, 5.0, 37_000),
-        Core::M3 => (24.6, 4.03, 36_500),
-        Core::M4F => (26.0, 3.98, 36_700),
+        Core::M0 => (35.1, 5.0, 13_300),
+        Core::M3 => (24.6, 4.03, 20_200),
+        Core::M4F => (26.0, 3.98, 20_200),
     };
     Model {
         element,
         code_of_light,
         light: 0.0,
         code,
-        stack: 1_900,
+        stack: 1_700,
     }
 }
 
@@ -112,15 +112,15 @@ const LUM_IN_BATCHES: Model = Model {
     element: 30.0,
     code_of_light: 7.05,
     light: 13_200.0,
-    code: 39_000,
+    code: 16_000,
     stack: 2_500,
 };
 
 const fn colour(core: Core) -> Model {
     let (element, code_of_light, code) = match core {
-        Core::M0 => (27.5, 15.5, 37_300),
-        Core::M3 => (18.4, 12.6, 34_900),
-        Core::M4F => (17.4, 12.6, 36_700),
+        Core::M0 => (27.5, 15.5, 25_300),
+        Core::M3 => (18.4, 12.6, 36_000),
+        Core::M4F => (17.4, 12.6, 36_200),
     };
     Model {
         element,
@@ -133,9 +133,9 @@ const fn colour(core: Core) -> Model {
 
 const fn any(core: Core) -> Model {
     let (code_of_light, code) = match core {
-        Core::M0 => (900.0, 40_000),
-        Core::M3 => (455.0, 39_000),
-        Core::M4F => (440.0, 39_000),
+        Core::M0 => (900.0, 37_000),
+        Core::M3 => (455.0, 37_000),
+        Core::M4F => (440.0, 37_000),
     };
     Model {
         element: 25.0,

@@ -221,13 +221,13 @@ impl RowFiller for Parallel<'_> {
     fn estimate(&self, _: &Mesh, polygon: &Polygon, row: &mut [f32]) {
         let shooter = Shooter::new(*polygon);
         self.fill(row, |receiver, range| {
-            if shooter.is_out_of_sight(receiver) {
+            let view = shooter.seen_by(receiver, self.bvh);
+            if view.is_hidden() {
                 return Vec::new();
             }
-            let narrowed = self.bvh.narrowed(&shaft(polygon, receiver));
             let receivers = self.receivers[range.clone()].iter();
             receivers
-                .map(|receiver| shooter.estimate(receiver.polygon(), &narrowed))
+                .map(|receiver| view.estimate(receiver, self.bvh))
                 .collect()
         });
     }

@@ -23,8 +23,8 @@ use glam::{Vec2, Vec3};
 use heapless::Vec;
 
 use crate::geometry::{Polygon, SamplePoint, as_many, from_unit_square};
-use crate::mesh::{Element, Mesh};
-use crate::visibility::{Shaft, Visibility};
+use crate::mesh::Mesh;
+use crate::visibility::Visibility;
 
 pub use estimate::estimate;
 pub use lambert::point_to_polygon;
@@ -138,21 +138,6 @@ impl Shooter {
     }
 }
 
-/// All that a shaft admits; `None` when it is more than [`BLOCKERS`].
-fn blockers(
-    shaft: impl FnOnce() -> Shaft,
-    visibility: &impl Visibility,
-) -> Option<Vec<&Polygon, BLOCKERS>> {
-    let mut blockers = Vec::new();
-    let mut fits = true;
-    if visibility.may_block() {
-        visibility.between(&shaft(), &mut |blocker| {
-            fits &= blockers.push(blocker.polygon).is_ok();
-        });
-    }
-    fits.then_some(blockers)
-}
-
 /// True when all of `other` lies behind the plane of `polygon`, or in it.
 fn faces_away(polygon: &Polygon, other: &Polygon) -> bool {
     other.vertices().iter().all(|v| {
@@ -172,8 +157,22 @@ pub fn fill(
     visibility: &impl Visibility,
     row: &mut [f32],
 ) {
+    fill_with(mesh, shooter, first, visibility, row, View::form_factor);
+}
+
+/// Fills `row[j]` with what `factor` says of element `first + j`; 0 beyond the mesh.
+fn fill_with<'s, V: Visibility>(
+    mesh: &Mesh,
+    shooter: &'s Shooter,
+    first: u32,
+    visibility: &'s V,
+    row: &mut [f32],
+    factor: impl Fn(&View<'s>, &Receiver, &V) -> f32,
+) {
+    let elements = mesh.elements.get(first as usize..).unwrap_or_default();
+    row.fill(0.0);
     let mut near: Option<(u32, View)> = None;
-    fill_with(mesh, first, row, |element, receiver| {
+    for (value, element) in row.iter_mut().zip(elements) {
         // Neighbours are of the same patch, for which what stands between is looked up once.
         let known = near.take().filter(|(patch, _)| *patch == element.patch);
         let look_up = || {
@@ -181,24 +180,9 @@ pub fn fill(
             Some((element.patch, shooter.seen_by(&patch, visibility)))
         };
         near = known.or_else(look_up);
-        near.as_ref().map_or(0.0, |(_, view)| {
-            view.form_factor(&Receiver::new(receiver), visibility)
-        })
-    });
-}
-
-/// Fills `row[j]` with what `factor` says of element `first + j`; 0 beyond the mesh.
-fn fill_with(
-    mesh: &Mesh,
-    first: u32,
-    row: &mut [f32],
-    mut factor: impl FnMut(&Element, Polygon) -> f32,
-) {
-    let elements = mesh.elements.get(first as usize..).unwrap_or_default();
-    row.fill(0.0);
-    for (value, element) in row.iter_mut().zip(elements) {
-        if let Some(receiver) = mesh.element_polygon(element) {
-            *value = factor(element, receiver);
+        let receiver = mesh.element_polygon(element).map(Receiver::new);
+        if let (Some((_, view)), Some(receiver)) = (&near, receiver) {
+            *value = factor(view, &receiver, visibility);
         }
     }
 }

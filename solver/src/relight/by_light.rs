@@ -23,7 +23,7 @@ pub fn add_lights<F: Form>(
     check_elements(atlas, sums.len())?;
     sums.fill(F::Sum::default());
     for light in 0..atlas.light_count() {
-        let after = mix.terms(atlas, light, F::BITS)?;
+        let after = mix.terms::<F::Known>(atlas, light, F::BITS)?;
         F::fill(table, 0, None, &after);
         add::<F>(atlas, light, table, sums)?;
     }
@@ -43,9 +43,9 @@ pub fn change_light<F: Form>(
 ) -> Result<(), RelightError> {
     check_elements(atlas, sums.len())?;
     F::codes(atlas).ok_or(RelightError::Code)?;
-    let before = mix.terms(atlas, light, F::BITS)?;
+    let before = mix.terms::<F::Known>(atlas, light, F::BITS)?;
     mix.set(light, levels);
-    let after = mix.terms(atlas, light, F::BITS)?;
+    let after = mix.terms::<F::Known>(atlas, light, F::BITS)?;
     F::fill(table, 0, Some(&before), &after);
     add::<F>(atlas, light, table, sums)
 }

@@ -14,10 +14,11 @@
 
 use core::hint::black_box;
 
-use super::frame::{Encode, Finish, FrameMix, Terms, Weight};
+use super::frame::{Encode, Finish, FrameLight, FrameMix, Terms, Weight};
 use super::{CodeTable, RelightError, check_elements};
-use crate::atlas::Atlas;
-use crate::code::Code;
+use crate::atlas::{Atlas, AtlasError};
+use crate::code::{AllCodes, Code, ExponentialCodes, Known};
+use crate::color::Rgb;
 
 /// Bits of red, green and blue in a packed word, red at the top.
 const PACKED: [u32; 3] = [10, 12, 10];
@@ -27,6 +28,8 @@ const SINGLE: u32 = 16;
 
 /// How the codes of an element are stored, and their contributions summed.
 pub trait Form {
+    /// The codes that an atlas in this form may be in.
+    type Known: Known;
     /// What all lights of the atlas are written in has so many bytes.
     type Codes: Copy;
     /// The contribution of a light, or a sum of them.
@@ -37,6 +40,22 @@ pub trait Form {
 
     /// Bits of a sum.
     const BITS: [u32; 3];
+
+    /// Reads an atlas, without its mesh, for the kernels of this form.
+    ///
+    /// # Errors
+    /// [`AtlasError`], also for codes that no atlas in this form may be in.
+    fn parse(bytes: &[u8]) -> Result<Atlas<'_>, AtlasError>;
+
+    /// [`FrameMix::new`] for the kernels of this form.
+    ///
+    /// # Errors
+    /// As there, and [`RelightError::Code`].
+    fn mix<'a>(
+        atlas: &Atlas,
+        full: &[Rgb],
+        lights: &'a mut [FrameLight],
+    ) -> Result<FrameMix<'a>, RelightError>;
 
     /// The codes of all elements, whose lights stand next to each other; `None` for lights in another form.
     fn codes<'a>(atlas: &Atlas<'a>) -> Option<&'a [Self::Codes]>;
@@ -68,11 +87,24 @@ pub trait Form {
 pub struct Lum;
 
 impl Form for Lum {
+    type Known = ExponentialCodes;
     type Codes = u8;
     type Sum = u32;
     type Table<const L: usize> = [[u32; L]; 256];
 
     const BITS: [u32; 3] = PACKED;
+
+    fn parse(bytes: &[u8]) -> Result<Atlas<'_>, AtlasError> {
+        Atlas::parse_exponential(bytes)
+    }
+
+    fn mix<'a>(
+        atlas: &Atlas,
+        full: &[Rgb],
+        lights: &'a mut [FrameLight],
+    ) -> Result<FrameMix<'a>, RelightError> {
+        FrameMix::exponential(atlas, full, lights)
+    }
 
     fn codes<'a>(atlas: &Atlas<'a>) -> Option<&'a [u8]> {
         let fits = atlas.is_all_in(|code| code == Code::Lum8);
@@ -92,13 +124,13 @@ impl Form for Lum {
         };
         let is_new = before.is_none();
         let own = table.iter_mut().filter_map(|lights| lights.get_mut(light));
-        values.with_codes(own, |entry, value| {
-            let old = if is_new {
-                0
+        values.with_codes::<Self::Known, _>(own, |entry, value| {
+            let new = pack(*r, *g, *b, value);
+            *entry = if is_new {
+                new
             } else {
-                pack(old_r, old_g, old_b, value)
+                new.wrapping_sub(pack(old_r, old_g, old_b, value))
             };
-            *entry = pack(*r, *g, *b, value).wrapping_sub(old);
         });
     }
 
@@ -109,7 +141,8 @@ impl Form for Lum {
 
     #[inline(always)]
     fn steps(sum: u32, factors: [u16; 3]) -> [u32; 3] {
-        let [r, g, b] = factors.map(u32::from);
+        let [r, g, b] = factors;
+        let (r, g, b) = (u32::from(r), u32::from(g), u32::from(b));
         // Products of 10 or 12 bits and 16; steps of 11.
         [
             ((sum >> 22) * r) >> 15,
@@ -124,11 +157,24 @@ impl Form for Lum {
 pub struct Colour;
 
 impl Form for Colour {
+    type Known = AllCodes;
     type Codes = [u8; 3];
     type Sum = [u16; 3];
     type Table<const L: usize> = [[[u16; L]; 256]; 3];
 
     const BITS: [u32; 3] = [SINGLE; 3];
+
+    fn parse(bytes: &[u8]) -> Result<Atlas<'_>, AtlasError> {
+        Atlas::parse_codes(bytes)
+    }
+
+    fn mix<'a>(
+        atlas: &Atlas,
+        full: &[Rgb],
+        lights: &'a mut [FrameLight],
+    ) -> Result<FrameMix<'a>, RelightError> {
+        FrameMix::new(atlas, full, lights)
+    }
 
     fn codes<'a>(atlas: &Atlas<'a>) -> Option<&'a [[u8; 3]]> {
         let fits = atlas.is_all_in(|code| code.bytes() == 3);
@@ -144,7 +190,7 @@ impl Form for Colour {
         let channels = tables.iter_mut().zip(after).zip(weights(before));
         for ((table, (weight, values)), old) in channels {
             let own = table.iter_mut().filter_map(|lights| lights.get_mut(light));
-            values.with_codes(own, |entry, value| {
+            values.with_codes::<Self::Known, _>(own, |entry, value| {
                 *entry = weight.of(value).wrapping_sub(old.of(value)) as u16;
             });
         }
@@ -167,13 +213,9 @@ impl Form for Colour {
 
     #[inline(always)]
     fn steps(sum: [u16; 3], factors: [u16; 3]) -> [u32; 3] {
-        let ([r, g, b], [factor_r, factor_g, factor_b]) =
-            (sum.map(u32::from), factors.map(u32::from));
-        [
-            (r * factor_r) >> 21,
-            (g * factor_g) >> 21,
-            (b * factor_b) >> 21,
-        ]
+        let ([r, g, b], [factor_r, factor_g, factor_b]) = (sum, factors);
+        let step = |sum: u16, factor: u16| (u32::from(sum) * u32::from(factor)) >> 21;
+        [step(r, factor_r), step(g, factor_g), step(b, factor_b)]
     }
 }
 
@@ -200,7 +242,7 @@ pub fn fill_table<F: Form, const L: usize>(
     light: u32,
     table: &mut F::Table<L>,
 ) -> Result<(), RelightError> {
-    let after = mix.terms(atlas, light, F::BITS)?;
+    let after = mix.terms::<F::Known>(atlas, light, F::BITS)?;
     F::fill(table, light as usize, None, &after);
     Ok(())
 }
@@ -300,10 +342,11 @@ impl<'a, F: Form> Sums<'a, F> {
         check_elements(atlas, sums.len())?;
         let rows = rows::<F, K>(atlas)?;
         sums.fill(F::Sum::default());
-        for light in 0..K {
-            let after = mix.terms(atlas, light as u32, F::BITS)?;
+        // As many as `K`, but one copy of the loop is enough.
+        for light in 0..atlas.light_count() {
+            let after = mix.terms::<F::Known>(atlas, light, F::BITS)?;
             F::fill(table, 0, None, &after);
-            add_light::<F, K>(rows, light, table, sums);
+            add_light::<F, K>(rows, light as usize, table, sums);
         }
         Ok(Self { sums, table })
     }
@@ -353,9 +396,9 @@ impl<'a, F: Form> Sums<'a, F> {
         mix: &mut FrameMix,
         (light, levels): (u32, [u16; 3]),
     ) -> Result<(), RelightError> {
-        let before = mix.terms(atlas, light, F::BITS)?;
+        let before = mix.terms::<F::Known>(atlas, light, F::BITS)?;
         mix.set(light, levels);
-        let after = mix.terms(atlas, light, F::BITS)?;
+        let after = mix.terms::<F::Known>(atlas, light, F::BITS)?;
         F::fill(self.table, 0, Some(&before), &after);
         Ok(())
     }
@@ -410,11 +453,13 @@ impl<'a> AnyTable<'a> {
         mix: &FrameMix,
         light: u32,
     ) -> Result<(), RelightError> {
-        let terms = mix.terms(atlas, light, [SINGLE; 3])?;
+        let terms = mix.terms::<AllCodes>(atlas, light, [SINGLE; 3])?;
         self.0.fill(light, |channel, code| {
             let term = terms.get(channel);
             // Below the full scale.
-            term.map_or(0, |(weight, values)| weight.of(values.of(code)) as u16)
+            term.map_or(0, |(weight, values)| {
+                weight.of(values.of::<AllCodes>(code)) as u16
+            })
         });
         Ok(())
     }

@@ -1,9 +1,10 @@
 extern crate std;
 use super::*;
-use crate::atlas::{Contents, LightEntry, Quantity, size, write};
+use crate::atlas::{AtlasError, Contents, LightEntry, Quantity, size, write};
 use crate::code::{Code, Curve, Scale};
 use crate::tone::{Exposure, Rgb565Table, Rgb888Table, radiance};
 use proptest::prelude::*;
+use std::format;
 use std::vec;
 use std::vec::Vec;
 
@@ -236,4 +237,33 @@ fn what_does_not_fit_is_refused() {
     assert_eq!(refused, Err(RelightError::Table { needed: 6 }));
     assert_eq!(mix.levels(5), Some([0; 3]));
     assert_eq!(mix.levels(6), None);
+}
+
+#[test]
+fn who_knows_only_exponential_codes_gets_the_same_from_them() {
+    for code in [Code::Exp8, Code::Exp8s, Code::Lum8] {
+        let bytes = atlas_bytes(code);
+        let (all, few) = (Atlas::parse(&bytes), Atlas::parse_exponential(&bytes));
+        let (all, few) = (all.unwrap(), few.unwrap());
+        assert_eq!(all.codes(), few.codes());
+        let full: Vec<Rgb> = (0..LIGHTS).map(|l| Rgb::splat(0.3 + l as f32)).collect();
+        let mut rooms = [[FrameLight::EMPTY; LIGHTS]; 2];
+        let [of_all, of_few] = &mut rooms;
+        let of_all = FrameMix::new(&all, &full, of_all).unwrap();
+        let of_few = FrameMix::exponential(&few, &full, of_few).unwrap();
+        assert_eq!(format!("{of_all:?}"), format!("{of_few:?}"), "{code:?}");
+
+        for at in 0..bytes.len() {
+            let mut damaged = bytes.clone();
+            damaged[at] ^= 0x10;
+            assert!(Atlas::parse_exponential(&damaged).is_err(), "byte {at}");
+        }
+    }
+    let bytes = atlas_bytes(Code::Display8);
+    let refused = Atlas::parse_exponential(&bytes).err();
+    assert_eq!(refused, Some(AtlasError::Illegal("code")));
+    let atlas = Atlas::parse(&bytes).unwrap();
+    let mut room = [FrameLight::EMPTY; LIGHTS];
+    let refused = FrameMix::exponential(&atlas, &[Rgb::WHITE; LIGHTS], &mut room).err();
+    assert_eq!(refused, Some(RelightError::Code));
 }

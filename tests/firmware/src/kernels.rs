@@ -52,7 +52,8 @@ fn volatile<const K: usize>(levels: &[[u16; 3]; K]) -> [[u16; 3]; K] {
     unsafe { core::ptr::read_volatile(levels) }
 }
 
-fn set_all<const K: usize>(mix: &mut FrameMix, levels: &[[u16; 3]; K]) {
+#[inline(never)]
+fn set_all(mix: &mut FrameMix, levels: &[[u16; 3]]) {
     for (light, levels) in (0..).zip(levels) {
         mix.set(light, *levels);
     }
@@ -66,6 +67,7 @@ fn one_index(pixels: &[u16], at: u32) {
     let _ = (pixels, at);
 }
 
+#[inline(never)]
 fn report(per_frame: u32, warm: u32, hash: u32) -> ! {
     say(c"per_frame", per_frame);
     say(c"per_frame_warm", warm);
@@ -82,13 +84,13 @@ pub fn run_full<F: Form, const K: usize, const L: usize>(
 ) -> ! {
     paint_stack();
     let [first, second] = input.levels.each_ref().map(volatile);
-    let atlas = must(Atlas::parse_codes(input.atlas));
+    let atlas = must(F::parse(input.atlas));
     let mut room = [FrameLight::EMPTY; K];
-    let mut mix = must(FrameMix::new(&atlas, &input.full, &mut room));
+    let mut mix = must(F::mix(&atlas, &input.full, &mut room));
     let finish = must(Finish::new(&atlas, &mix, input.runs, input.exposure, &TONE));
     let mut frame = |levels: &[[u16; 3]; K], table: &mut F::Table<L>, pixels: &mut [u16]| {
         set_all(&mut mix, levels);
-        for light in 0..K as u32 {
+        for light in 0..atlas.light_count() {
             must(fill_table::<F, L>(&atlas, &mix, light, table));
         }
         must(full::<F, K, L, _>(
@@ -123,9 +125,9 @@ pub fn run_sums<F: Form, const K: usize>(
 ) -> ! {
     paint_stack();
     let [_, second] = input.levels.each_ref().map(volatile);
-    let atlas = must(Atlas::parse_codes(input.atlas));
+    let atlas = must(F::parse(input.atlas));
     let mut room = [FrameLight::EMPTY; K];
-    let mut mix = must(FrameMix::new(&atlas, &input.full, &mut room));
+    let mut mix = must(F::mix(&atlas, &input.full, &mut room));
     let finish = must(Finish::new(&atlas, &mix, input.runs, input.exposure, &TONE));
     let cold = count(|| {
         set_all(&mut mix, &second);
@@ -148,9 +150,9 @@ pub fn run_change<F: Form, const K: usize>(
     let (Some(before), Some(after)) = (first.get(light), second.get(light)) else {
         exit(1)
     };
-    let atlas = must(Atlas::parse_codes(input.atlas));
+    let atlas = must(F::parse(input.atlas));
     let mut room = [FrameLight::EMPTY; K];
-    let mut mix = must(FrameMix::new(&atlas, &input.full, &mut room));
+    let mut mix = must(F::mix(&atlas, &input.full, &mut room));
     let finish = must(Finish::new(&atlas, &mix, input.runs, input.exposure, &TONE));
     set_all(&mut mix, &first);
     let mut kept = must(Sums::<F>::new::<K>(&atlas, &mix, sums, table));
@@ -187,7 +189,7 @@ pub fn run_any<const K: usize>(
     let mut table = must(AnyTable::new(&atlas, &mix, values));
     let cold = count(|| {
         set_all(&mut mix, &second);
-        for light in 0..K as u32 {
+        for light in 0..atlas.light_count() {
             must(table.update(&atlas, &mix, light));
         }
         must(full_any(&atlas, &table, &finish, sums, pixels));
