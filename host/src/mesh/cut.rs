@@ -459,3 +459,134 @@ fn triangles_and_quads(outline: &[Vec3]) -> Option<Vec<Polygon>> {
     }
     Some(polygons)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bake::{Settings, bake};
+    use crate::scene::Light;
+    use crate::texture::Image;
+    use relume::color::Rgb;
+    use relume::scene::{Luminaire, Source};
+    use std::ops::ControlFlow;
+    use std::sync::Arc;
+
+    /// A box without a lid, standing on `z = 0`, and a square at the height `lid` with `half` an edge.
+    fn drum(lid: f32, half: f32) -> OwnedScene {
+        let size = 0.37;
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+        let square = |size: f32, z: f32| corners.map(|(x, y)| Vec3::new(x * size, y * size, z));
+        let (low, high) = (square(size, 0.0), square(size, 1.0));
+        let walls = (0..4).map(|i| [low[i], low[(i + 1) % 4], high[(i + 1) % 4], high[i]]);
+        let outlines = walls.chain([low, square(half, lid)]);
+        let light = |name: &str| Light {
+            name: name.to_owned(),
+            emission: Rgb::WHITE,
+            importance: 1.0,
+        };
+        let bulb = |light, position| Luminaire::new(light, Rgb::WHITE, Source::Point { position });
+        OwnedScene {
+            surfaces: outlines
+                .map(|outline| {
+                    Surface::new(0, &outline, Rgb::splat(0.5))
+                        .unwrap()
+                        .two_sided()
+                })
+                .collect(),
+            textures: vec![None; 6],
+            luminaires: vec![
+                bulb(0, Vec3::new(0.1, 0.05, 0.4)).unwrap(),
+                bulb(1, Vec3::new(0.8, 0.3, 0.3)).unwrap(),
+            ],
+            lights: vec![light("inside"), light("outside")],
+        }
+    }
+
+    fn cut_at(scene: &OwnedScene) -> Cow<'_, OwnedScene> {
+        cut(scene, Some(1.0), Some(0.25)).unwrap()
+    }
+
+    #[test]
+    fn a_lid_that_juts_out_is_cut_along_the_drum() {
+        let image = Arc::new(Image {
+            width: 1,
+            height: 1,
+            texels: vec![[0.5; 3]],
+        });
+        let mut scene = drum(1.0, 1.0);
+        scene.textures[5] = Some(SurfaceTexture {
+            image,
+            factor: [1.0; 3],
+            corners: [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+                .map(Vec2::from)
+                .to_vec(),
+        });
+        let cut = cut_at(&scene);
+        let pieces = &cut.surfaces[5..];
+        assert!(pieces.len() >= 5, "{} pieces", pieces.len());
+        let area: f32 = pieces.iter().map(|piece| piece.polygon().area()).sum();
+        assert!((area - 4.0).abs() < 1e-5, "{area} m2");
+        for (piece, texture) in pieces.iter().zip(&cut.textures[5..]) {
+            let outline = piece.polygon();
+            let is_in = |v: &Vec3| v.x.abs() <= 0.371 && v.y.abs() <= 0.371;
+            let is_out = |outside: fn(Vec3) -> f32| {
+                let vertices = outline.vertices().iter();
+                vertices.fold(f32::INFINITY, |least, v| least.min(outside(*v))) >= 0.369
+            };
+            let beside = [|v: Vec3| v.x, |v: Vec3| -v.x, |v: Vec3| v.y, |v: Vec3| -v.y];
+            let is_inside = outline.vertices().iter().all(is_in);
+            assert!(is_inside || beside.into_iter().any(is_out), "{outline:?}");
+            // Coordinates in the image were those in the plane.
+            for (vertex, corner) in outline
+                .vertices()
+                .iter()
+                .zip(&texture.as_ref().unwrap().corners)
+            {
+                assert!((vertex.truncate() - *corner).length() < 1e-5);
+            }
+        }
+    }
+
+    #[test]
+    fn a_lid_that_light_passes_under_or_that_ends_with_the_drum_stays_whole() {
+        for (lid, half) in [(1.1, 1.0), (1.0, 0.37)] {
+            let scene = drum(lid, half);
+            assert!(matches!(cut_at(&scene), Cow::Borrowed(_)), "{lid}, {half}");
+        }
+        // Nor is the floor under a box that is dark inside.
+        let mut scene = drum(0.0, 1.0);
+        let high = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+        let high = high.map(|(x, y)| Vec3::new(x * 0.37, y * 0.37, 1.0));
+        scene.surfaces[4] = Surface::new(4, &high, Rgb::splat(0.5)).unwrap().two_sided();
+        scene.luminaires.remove(0);
+        assert!(matches!(cut_at(&scene), Cow::Borrowed(_)));
+    }
+
+    #[test]
+    fn no_light_passes_a_drum_and_its_lid() {
+        let settings = Settings {
+            patch: Some(1.0),
+            element: Some(0.25),
+            ..Settings::default()
+        };
+        let mut go_on = |_| ControlFlow::Continue(());
+        let solution = bake(&drum(1.0, 1.0), &settings, &mut go_on).unwrap();
+        let mesh = solution.mesh.view();
+        for (id, element) in mesh.elements.iter().enumerate() {
+            let outline = mesh.element_polygon(element).unwrap();
+            let above = outline.center() + outline.normal() * 1e-3;
+            let is_inside =
+                above.truncate().abs().max_element() < 0.37 && above.z > 0.0 && above.z < 1.0;
+            let [inside, outside] = *solution.element(id) else {
+                panic!("two lights");
+            };
+            let (own, other) = if is_inside {
+                (inside, outside)
+            } else {
+                (outside, inside)
+            };
+            assert_eq!(other, Rgb::BLACK, "{outline:?}");
+            assert!(!is_inside || own != Rgb::BLACK, "{outline:?}");
+        }
+    }
+}
