@@ -98,7 +98,7 @@ pub fn cut(
             whole.surfaces.extend(parts);
         } else {
             whole.textures.push(texture.cloned());
-            whole.surfaces.push(surface.clone());
+            whole.surfaces.push(*surface);
         }
     }
     Ok(Cow::Owned(whole))
