@@ -21,6 +21,7 @@ use relume::scene::{Scene, SceneError};
 use relume::visibility::OccludersAndBodies;
 use thiserror::Error;
 
+use self::estimate::Senders;
 use crate::bvh::Bvh;
 use crate::gather::Hits;
 use crate::mesh::{self, BuildError, Centred, OwnedMesh};
@@ -333,7 +334,12 @@ impl<'a> Meshed<'a> {
             watch,
         };
         let (solved, hits) = solve(&mut job, self.mesh.clone())?;
-        let seen = estimate::errors(job.scene, &solved.mesh, &self.bvh, &solved.contributions);
+        let senders = match settings.method {
+            Method::Gather if !settings.plain => Senders::Elements,
+            _ => Senders::Patches,
+        };
+        let (mesh, found) = (&solved.mesh, &solved.contributions);
+        let seen = estimate::errors(job.scene, mesh, &self.bvh, found, senders);
         let of_mesh = seen.iter().zip(&solved.errors);
         let of_mesh = of_mesh.map(|(seen, left)| (seen * seen - left * left).max(0.0).sqrt());
         Ok(Baked {

@@ -10,6 +10,7 @@ use relume::color::Rgb;
 use relume::mesh::Side;
 use relume::scene::{Luminaire, Source, Surface};
 
+use super::estimate::Senders;
 use super::{BakeError, Job, Progress, Settings, bounce, estimate, solution};
 use crate::bvh::Bvh;
 use crate::gather::Hits;
@@ -76,7 +77,13 @@ pub fn update(
     };
     let is_changed = |light: u32| kept[light as usize].is_none();
     let solved = bounce::along(&mut job, mesh, &bvh, hits, is_changed)?;
-    let seen = estimate::errors(&view, &solved.mesh, &bvh, &solved.contributions);
+    let seen = estimate::errors(
+        &view,
+        &solved.mesh,
+        &bvh,
+        &solved.contributions,
+        Senders::Elements,
+    );
     let mut new = solution(scene, Method::Gather, old.spacing, solved, &seen);
     take_over(&mut new, old, &kept);
     let changed = kept.iter().filter(|kept| kept.is_none()).count();

@@ -159,13 +159,13 @@ impl Bvh {
     /// rounding has it, so rays should start at [`lifted`] points.
     #[must_use]
     pub const fn caster(&self) -> Caster<'_> {
-        Caster::new(&self.facets)
+        Caster::new(&self.facets, &self.stacks)
     }
 
     /// The same from one [`lifted`] point.
     #[must_use]
     pub fn caster_from(&self, point: Vec3) -> PointCaster<'_> {
-        PointCaster::new(&self.facets, point)
+        PointCaster::new(&self.facets, &self.stacks, point)
     }
 
     fn crossing(&self, index: usize, from: Vec3, to: Vec3) -> Option<f32> {

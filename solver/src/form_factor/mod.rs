@@ -23,7 +23,7 @@ use glam::{Vec2, Vec3};
 use heapless::Vec;
 
 use crate::geometry::{Polygon, SamplePoint, as_many, from_unit_square};
-use crate::mesh::Mesh;
+use crate::mesh::{Face, Mesh};
 use crate::visibility::Visibility;
 
 pub use estimate::estimate;
@@ -71,17 +71,33 @@ impl Shooter {
     /// A patch of a mesh, without what lies on top of it; `None` for one that the mesh does not have.
     #[must_use]
     pub fn of_patch(mesh: &Mesh, patch: u32, visibility: &impl Visibility) -> Option<Self> {
-        let mut shooter = Self::new(mesh.patch_polygon(patch)?);
         let face = mesh.patches.get(patch as usize)?.face;
-        let surface = mesh.faces.get(face as usize)?.surface;
-        let facing = shooter.polygon.normal();
-        visibility.above(surface, facing, &mut |cover| {
-            let _ = shooter.covers.push(*cover);
-        });
-        Some(shooter)
+        let face = mesh.faces.get(face as usize)?;
+        Some(Self::of_face(face, visibility).part(mesh.patch_polygon(patch)?))
     }
 
-    fn is_covered(&self, point: Vec3) -> bool {
+    /// A whole face, without what lies on top of it.
+    #[must_use]
+    pub fn of_face(face: &Face, visibility: &impl Visibility) -> Self {
+        let mut shooter = Self::new(face.polygon);
+        visibility.above(face.surface, face.polygon.normal(), &mut |cover| {
+            let _ = shooter.covers.push(*cover);
+        });
+        shooter
+    }
+
+    /// A part of it.
+    #[must_use]
+    pub fn part(&self, polygon: Polygon) -> Self {
+        Self {
+            covers: self.covers.clone(),
+            ..Self::new(polygon)
+        }
+    }
+
+    /// True for a point of it on which something lies.
+    #[must_use]
+    pub fn is_covered(&self, point: Vec3) -> bool {
         self.covers.iter().any(|cover| cover.holds(point))
     }
 
