@@ -59,11 +59,12 @@ pub(super) fn bake_to(
     let mut bakes = 0;
     loop {
         settings.element = Some(element);
+        let scene = mesh::cut(scene, settings.patch, settings.element)?;
         let Baked {
             solution,
             hits,
             of_mesh,
-        } = Meshed::new(scene, settings.patch, settings.element, &mut watch)?
+        } = Meshed::new(&scene, settings.patch, settings.element, &mut watch)?
             .bake(&settings, &mut watch)?;
         bakes += 1;
         let worst = solution.lights.iter().map(|light| light.error);

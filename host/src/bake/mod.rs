@@ -202,7 +202,10 @@ pub fn bake_keeping(
     watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<(Solution, Hits), BakeError> {
     match settings.error {
-        None => Meshed::new(scene, settings.patch, settings.element, watch)?.solve(settings, watch),
+        None => {
+            let scene = mesh::cut(scene, settings.patch, settings.element)?;
+            Meshed::new(&scene, settings.patch, settings.element, watch)?.solve(settings, watch)
+        }
         Some(goal) => accuracy::bake_to(scene, settings, goal, watch),
     }
 }

@@ -39,6 +39,8 @@ pub fn update(
     settings: &Settings,
     watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<(Solution, usize), BakeError> {
+    let (patch, element) = (old.spacing.patch, old.spacing.element);
+    let scene = &*mesh::cut(scene, Some(patch), Some(element))?;
     let centred = mesh::centred(scene);
     let view = centred.view()?;
     let mut mesh = mesh::placed(&old.mesh, view.surfaces());

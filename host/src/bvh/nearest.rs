@@ -103,6 +103,11 @@ impl<'a> PointCaster<'a> {
         }
     }
 
+    /// Casts rays from elsewhere.
+    pub const fn caster(&mut self) -> &mut Caster<'a> {
+        &mut self.caster
+    }
+
     /// The surface that a ray meets first; of several in one plane the one on top.
     #[must_use]
     pub fn nearest(&mut self, direction: Vec3) -> Option<Hit> {
