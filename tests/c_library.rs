@@ -121,7 +121,7 @@ fn cases() -> &'static [Case] {
 }
 
 /// Three bytes for every element.
-fn bytes_of<F: Form>(input: &Input, mut table: F::Table<1>) -> Vec<u8> {
+fn bytes_of<F: Form>(input: &Input, mut table: F::Table) -> Vec<u8> {
     let atlas = Atlas::parse(&input.atlas).unwrap();
     let mut room = vec![FrameLight::EMPTY; input.full.len()];
     let mut mix = FrameMix::new(&atlas, &input.full, &mut room).unwrap();
@@ -144,9 +144,9 @@ impl Case {
         changed[CHANGED] = second[CHANGED];
         let frame = |levels: &[[u16; 3]]| hash(&input.in_integers(levels));
         let bytes = if input.name.starts_with("lum") {
-            bytes_of::<Lum>(&input, [[0]; 256])
+            bytes_of::<Lum>(&input, Lum::EMPTY)
         } else {
-            bytes_of::<Colour>(&input, [[[0]; 256]; 3])
+            bytes_of::<Colour>(&input, Colour::EMPTY)
         };
         let expected = vec![
             ("full_565", frame(second)),

@@ -129,7 +129,8 @@ fn emulate(target: &str, name: &str) -> (Option<i32>, String) {
     let (_, own) = config
         .split_once(&format!("[target.{target}]"))
         .expect("a runner");
-    let runner = own.split('"').nth(1).expect("in quotes");
+    let (_, runner) = own.split_once("runner = \"").expect("a runner");
+    let (runner, _) = runner.split_once('"').expect("in quotes");
     let output = Command::new("timeout")
         .arg("120")
         .args(runner.split(' '))

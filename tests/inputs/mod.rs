@@ -183,11 +183,9 @@ impl Input {
         let finish = finish.expect("the exposure is not that far from white");
         let mut pixels = vec![0; atlas.element_count() as usize];
         match self.name {
-            "lum_960x8" => self.table::<Lum, 8, 8>(&mix, [[0; 8]; 256], &finish, &mut pixels),
-            "lum_1920x30" => self.table::<Lum, 30, 32>(&mix, [[0; 32]; 256], &finish, &mut pixels),
-            "rgb_960x8" => {
-                self.table::<Colour, 8, 8>(&mix, [[[0; 8]; 256]; 3], &finish, &mut pixels)
-            }
+            "lum_960x8" => self.table::<Lum, 8>(&mix, &finish, &mut pixels),
+            "lum_1920x30" => self.table::<Lum, 30>(&mix, &finish, &mut pixels),
+            "rgb_960x8" => self.table::<Colour, 8>(&mix, &finish, &mut pixels),
             _ => {
                 let mut values = vec![0; table_length(&atlas)];
                 let table = AnyTable::new(&atlas, &mix, &mut values).expect("it fits");
@@ -198,18 +196,18 @@ impl Input {
         pixels
     }
 
-    fn table<F: Form, const K: usize, const L: usize>(
+    fn table<F: Form, const K: usize>(
         &self,
         mix: &FrameMix,
-        mut table: F::Table<L>,
         finish: &Finish<Rgb565Table>,
         pixels: &mut [u16],
     ) {
         let atlas = Atlas::parse(&self.atlas).expect("an atlas");
-        for light in 0..K as u32 {
-            fill_table::<F, L>(&atlas, mix, light, &mut table).expect("a light");
+        let mut tables = [F::EMPTY; K];
+        for (light, table) in (0..).zip(&mut tables) {
+            fill_table::<F>(&atlas, mix, light, table).expect("a light");
         }
-        full::<F, K, L, _>(&atlas, &table, finish, pixels).expect("it fits");
+        full::<F, K, _>(&atlas, &tables, finish, pixels).expect("it fits");
     }
 
     /// Writes the atlas, and Rust that includes it.
