@@ -202,6 +202,7 @@ impl<'a> FrameMix<'a> {
     /// # Errors
     /// Slices that do not fit the atlas; weights that are negative or not finite; [`RelightError::Range`] with more than 1000
     /// lights.
+    #[inline(never)]
     pub fn new(
         atlas: &Atlas,
         full: &[Rgb],
@@ -327,6 +328,7 @@ impl<'a> FrameMix<'a> {
     }
 
     /// Of the lights that are not in tiles.
+    #[inline(never)]
     fn brightest_of_rows<K: Known>(&self, atlas: &Atlas) -> [u32; 3] {
         let codes = (0..).map_while(|light| atlas.code(light));
         let stride = codes.map(Code::bytes).sum::<usize>();

@@ -59,13 +59,19 @@ struct Ready {
     finish: Finish<'static, Rgb565Table>,
 }
 
+/// With a stack of its own, which is free again afterwards.
+#[inline(never)]
+fn parsed<F: Form>(bytes: &'static [u8]) -> Atlas<'static> {
+    must(F::parse(bytes))
+}
+
 /// Reads an atlas for the kernels of a form.
 #[inline(never)]
 fn ready<F: Form, const K: usize>(
     input: &'static Input<K>,
     room: &'static mut [FrameLight; K],
 ) -> Ready {
-    let atlas = must(F::parse(input.atlas));
+    let atlas = parsed::<F>(input.atlas);
     let mix = must(F::mix(&atlas, &input.full, room));
     let finish = must(Finish::new(&atlas, &mix, input.runs, input.exposure, &TONE));
     Ready { atlas, mix, finish }
@@ -104,23 +110,20 @@ pub fn run_full<F: Form, const K: usize>(
 ) -> ! {
     paint_stack();
     let [first, second] = input.levels.each_ref().map(volatile);
-    let Ready {
-        atlas,
-        mut mix,
-        finish,
-    } = ready::<F, K>(input, room);
+    let mut ready = ready::<F, K>(input, room);
+    let Ready { atlas, mix, finish } = &mut ready;
     let mut frame = |levels: &[[u16; 3]; K], tables: &mut [F::Table; K], pixels: &mut [u16]| {
-        set_all(&mut mix, levels);
+        set_all(mix, levels);
         for (light, table) in (0..).zip(tables.iter_mut()) {
-            must(fill_table::<F>(&atlas, &mix, light, table));
+            must(fill_table::<F>(atlas, mix, light, table));
         }
-        must(full::<F, K, _>(&atlas, black_box(tables), &finish, pixels));
+        must(full::<F, K, _>(atlas, black_box(tables), finish, pixels));
     };
     frame(&first, tables, pixels);
     let cold = count(|| frame(&second, tables, pixels));
     let cold_hash = hash(pixels);
     pixels.fill(0);
-    let warm = count(|| must(full::<F, K, _>(&atlas, black_box(tables), &finish, pixels)));
+    let warm = count(|| must(full::<F, K, _>(atlas, black_box(tables), finish, pixels)));
     same(cold_hash, hash(pixels));
     report(cold, warm, cold_hash)
 }
@@ -135,15 +138,12 @@ pub fn run_sums<F: Form, const K: usize>(
 ) -> ! {
     paint_stack();
     let [_, second] = input.levels.each_ref().map(volatile);
-    let Ready {
-        atlas,
-        mut mix,
-        finish,
-    } = ready::<F, K>(input, room);
+    let mut ready = ready::<F, K>(input, room);
+    let Ready { atlas, mix, finish } = &mut ready;
     let cold = count(|| {
-        set_all(&mut mix, &second);
-        let sums = must(Sums::<F>::new::<K>(&atlas, &mix, sums, table));
-        must(sums.show(&finish, pixels));
+        set_all(mix, &second);
+        let sums = must(Sums::<F>::new::<K>(atlas, mix, sums, table));
+        must(sums.show(finish, pixels));
     });
     report(cold, cold, hash(pixels))
 }
@@ -162,23 +162,20 @@ pub fn run_change<F: Form, const K: usize>(
     let (Some(before), Some(after)) = (first.get(light), second.get(light)) else {
         exit(1)
     };
-    let Ready {
-        atlas,
-        mut mix,
-        finish,
-    } = ready::<F, K>(input, room);
-    set_all(&mut mix, &first);
-    let mut kept = must(Sums::<F>::new::<K>(&atlas, &mix, sums, table));
-    must(kept.show(&finish, pixels));
+    let mut ready = ready::<F, K>(input, room);
+    let Ready { atlas, mix, finish } = &mut ready;
+    set_all(mix, &first);
+    let mut kept = must(Sums::<F>::new::<K>(atlas, mix, sums, table));
+    must(kept.show(finish, pixels));
     let unchanged = hash(pixels);
     let cold = count(|| {
-        must(kept.change::<K, _>(&atlas, &mut mix, (CHANGED, *after), &finish, pixels));
+        must(kept.change::<K, _>(atlas, mix, (CHANGED, *after), finish, pixels));
     });
     let changed = hash(pixels);
     one_index(pixels, changed);
-    must(kept.set(&atlas, &mut mix, (CHANGED, *before)));
+    must(kept.set(atlas, mix, (CHANGED, *before)));
     // What is left when the table is there already.
-    let warm = count(|| must(kept.apply::<K, _>(&atlas, CHANGED, &finish, pixels)));
+    let warm = count(|| must(kept.apply::<K, _>(atlas, CHANGED, finish, pixels)));
     same(unchanged, hash(pixels));
     report(cold, warm, changed)
 }
@@ -193,23 +190,20 @@ pub fn run_any<const K: usize>(
 ) -> ! {
     paint_stack();
     let [first, second] = input.levels.each_ref().map(volatile);
-    let Ready {
-        atlas,
-        mut mix,
-        finish,
-    } = ready::<Colour, K>(input, room);
-    set_all(&mut mix, &first);
-    let mut table = must(AnyTable::new(&atlas, &mix, values));
+    let mut ready = ready::<Colour, K>(input, room);
+    let Ready { atlas, mix, finish } = &mut ready;
+    set_all(mix, &first);
+    let mut table = must(AnyTable::new(atlas, mix, values));
     let cold = count(|| {
-        set_all(&mut mix, &second);
+        set_all(mix, &second);
         for light in 0..atlas.light_count() {
-            must(table.update(&atlas, &mix, light));
+            must(table.update(atlas, mix, light));
         }
-        must(full_any(&atlas, &table, &finish, sums, pixels));
+        must(full_any(atlas, &table, finish, sums, pixels));
     });
     let cold_hash = hash(pixels);
     pixels.fill(0);
-    let warm = count(|| must(full_any(&atlas, &table, &finish, sums, pixels)));
+    let warm = count(|| must(full_any(atlas, &table, finish, sums, pixels)));
     same(cold_hash, hash(pixels));
     report(cold, warm, cold_hash)
 }
