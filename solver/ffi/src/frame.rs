@@ -142,10 +142,7 @@ impl Layout {
         let is_colour = atlas.lights().all(|light| light.code.bytes() == 3);
         let (table, sum) = match (is_lum, is_colour) {
             (true, _) => (size_of::<<Lum as Form>::Table>(), size_of::<u32>()),
-            (_, true) => (
-                size_of::<<Colour as Form>::Table>(),
-                size_of::<[u16; 3]>(),
-            ),
+            (_, true) => (size_of::<<Colour as Form>::Table>(), size_of::<[u16; 3]>()),
             _ => return None,
         };
         let bytes = |count: u32, size: usize| usize::try_from(count).ok()?.checked_mul(size);

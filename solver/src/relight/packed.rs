@@ -15,7 +15,7 @@
 use core::array;
 use core::hint::black_box;
 
-use super::frame::{Encode, Finish, FrameLight, FrameMix, Terms};
+use super::frame::{Encode, Finish, FrameLight, FrameMix, Terms, Weight};
 use super::{CodeTable, RelightError, check_elements};
 use crate::atlas::{Atlas, AtlasError};
 use crate::code::{AllCodes, Code, ExponentialCodes, Known};
@@ -35,7 +35,7 @@ const IS_SMALL: bool = !cfg!(target_has_atomic = "32");
 const GROUP: usize = if IS_SMALL { 1 } else { 2 };
 
 /// Sums that are shown together.
-const SHOWN: usize = 2;
+const SHOWN: usize = if IS_SMALL { 2 } else { 4 };
 
 /// How the codes of an element are stored, and their contributions summed.
 pub trait Form {
@@ -72,8 +72,8 @@ pub trait Form {
     /// The codes of all elements, whose lights stand next to each other; `None` for lights in another form.
     fn codes<'a>(atlas: &Atlas<'a>) -> Option<&'a [Self::Codes]>;
 
-    /// Puts what a weight makes of every code into a table; of a change, minus what is there.
-    fn fill(table: &mut Self::Table, terms: &Terms, is_change: bool);
+    /// Puts what a weight makes of every code into a table; of a change, minus what it made before.
+    fn fill(table: &mut Self::Table, before: Option<&Terms>, after: &Terms);
 
     /// A sum, and what a table says of a light's codes.
     #[must_use]
@@ -114,17 +114,13 @@ impl Form for Lum {
         fits.then_some(atlas.codes())
     }
 
-    #[inline(never)]
-    fn fill(
-        table: &mut [u32; 256],
-        [(r, values), (g, _), (b, _)]: &Terms,
-        is_change: bool,
-    ) {
-        let kept = if is_change { u32::MAX } else { 0 };
-        values.with_codes::<Self::Known, _>(table.iter_mut(), |entry, value| {
-            let packed = r.of(value) << 22 | g.of(value) << 10 | b.of(value);
-            *entry = packed.wrapping_sub(*entry & kept);
-        });
+    fn fill(table: &mut [u32; 256], before: Option<&Terms>, after: &Terms) {
+        if let Some(before) = before {
+            fill_packed(table, before, 0);
+            fill_packed(table, after, u32::MAX);
+        } else {
+            fill_packed(table, after, 0);
+        }
     }
 
     #[inline(always)]
@@ -142,8 +138,21 @@ impl Form for Lum {
             ((sum & 0x3ff) * b) >> 15
         };
         // Steps of 11 bits.
-        [((sum >> 22) * r) >> 15, ((sum >> 6 & 0xffff) * g) >> 21, blue]
+        [
+            ((sum >> 22) * r) >> 15,
+            ((sum >> 6 & 0xffff) * g) >> 21,
+            blue,
+        ]
     }
+}
+
+/// Puts what a weight makes of every code into a table, minus what is `kept` of it.
+#[inline(never)]
+fn fill_packed(table: &mut [u32; 256], [(r, values), (g, _), (b, _)]: &Terms, kept: u32) {
+    values.with_codes::<ExponentialCodes, _>(table.iter_mut(), |entry, value| {
+        let packed = r.of(value) << 22 | g.of(value) << 10 | b.of(value);
+        *entry = packed.wrapping_sub(*entry & kept);
+    });
 }
 
 /// All lights in codes of three bytes.
@@ -177,11 +186,11 @@ impl Form for Colour {
     }
 
     #[inline(never)]
-    fn fill(tables: &mut [[u16; 256]; 3], terms: &Terms, is_change: bool) {
-        let kept = if is_change { u16::MAX } else { 0 };
-        for (table, (weight, values)) in tables.iter_mut().zip(terms) {
+    fn fill(tables: &mut [[u16; 256]; 3], before: Option<&Terms>, after: &Terms) {
+        let old = before.map_or([Weight::ZERO; 3], |terms| terms.map(|(weight, _)| weight));
+        for ((table, (weight, values)), old) in tables.iter_mut().zip(after).zip(old) {
             values.with_codes::<Self::Known, _>(table.iter_mut(), |entry, value| {
-                *entry = (weight.of(value) as u16).wrapping_sub(*entry & kept);
+                *entry = weight.of(value).wrapping_sub(old.of(value)) as u16;
             });
         }
     }
@@ -224,7 +233,7 @@ pub fn fill_table<F: Form>(
     table: &mut F::Table,
 ) -> Result<(), RelightError> {
     let terms = mix.terms::<F::Known>(atlas, light, F::BITS)?;
-    F::fill(table, &terms, false);
+    F::fill(table, None, &terms);
     Ok(())
 }
 
@@ -238,10 +247,10 @@ pub(super) fn fill_change<F: Form>(
     (light, levels): (u32, [u16; 3]),
     table: &mut F::Table,
 ) -> Result<(), RelightError> {
-    fill_table::<F>(atlas, mix, light, table)?;
+    let before = mix.terms::<F::Known>(atlas, light, F::BITS)?;
     mix.set(light, levels);
     let after = mix.terms::<F::Known>(atlas, light, F::BITS)?;
-    F::fill(table, &after, true);
+    F::fill(table, Some(&before), &after);
     Ok(())
 }
 
