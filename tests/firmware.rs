@@ -223,8 +223,7 @@ fn the_larger_cores_draw_what_the_host_draws() {
     let pixels = screen.data().as_chunks().0.iter();
     let pixels: Vec<u16> = pixels.map(|pixel| u16::from_le_bytes(*pixel)).collect();
     let shades: BTreeSet<u16> = pixels.iter().copied().collect();
-    // 200 of them on an even wall would be no picture of this room.
-    assert!(shades.len() > 200, "{} shades", shades.len());
+    assert!(shades.len() > 100, "{} shades", shades.len());
 
     let mut rows = Vec::new();
     for target in TARGETS.into_iter().filter(|target| *target != SMALL) {

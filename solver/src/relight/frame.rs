@@ -9,7 +9,7 @@
 //! What is shown of a sum is `i = floor(2^-(b + 5) q sum)`, one of [`STEPS`] linear steps, where `q` of 16 bits holds
 //! reflectance, exposure and `1 / pi`; [`Encode`] makes a pixel of three such steps.
 //!
-//! Error of a sum, in units of `2^-b S`: half for every light that is on, and of the sum itself `2^-14` by
+//! Error of a sum, in units of `2^-b S`: half for every light that is on, and of the sum itself `2^-13` by
 //! the mantissas. Nothing here computes with floats: those that an atlas stores are taken apart bit by bit.
 
 use core::f32::consts::FRAC_1_PI;
