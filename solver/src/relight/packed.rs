@@ -241,6 +241,7 @@ pub fn fill_table<F: Form>(
 ///
 /// # Errors
 /// [`RelightError::Lights`] without such a light. Nothing has changed then.
+#[inline(never)]
 pub(super) fn fill_change<F: Form>(
     atlas: &Atlas,
     mix: &mut FrameMix,
