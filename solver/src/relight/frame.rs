@@ -9,7 +9,7 @@
 //! What is shown of a sum is `i = floor(2^-(b + 5) q sum)`, one of [`STEPS`] linear steps, where `q` of 16 bits holds
 //! reflectance, exposure and `1 / pi`; [`Encode`] makes a pixel of three such steps.
 //!
-//! Error of a sum, in units of `2^-b S`: half for every light that is on, and of the sum itself `2^-14` by
+//! Error of a sum, in units of `2^-b S`: half for every light that is on, and of the sum itself `2^-13` by
 //! the mantissas. Nothing here computes with floats: those that an atlas stores are taken apart bit by bit.
 
 use core::f32::consts::FRAC_1_PI;
@@ -69,13 +69,20 @@ impl Gain {
         }
     }
 
+    /// Whether the factor times a reflectance has no more than 16 bits.
+    fn fits(self, reflectance: u16) -> bool {
+        let product = u32::from(self.mantissa) * u32::from(reflectance);
+        let bits = i32::from(self.exponent) - product.leading_zeros() as i32;
+        product == 0 || bits <= -16
+    }
+
     /// The factor times a level, for sums of so many bits.
     pub(super) fn weight(self, level: u16, bits: u32) -> Weight {
         let product = u32::from(self.mantissa) * u32::from(level);
-        let excess = 16_u32.saturating_sub(product.leading_zeros());
+        let excess = 17_u32.saturating_sub(product.leading_zeros());
         let shift = -(i32::from(self.exponent) + excess as i32 + bits as i32);
         match u32::try_from(shift) {
-            Ok(shift @ 2..=32) => Weight {
+            Ok(shift @ 1..=31) => Weight {
                 mantissa: product >> excess,
                 shift,
             },
@@ -87,21 +94,21 @@ impl Gain {
 /// What multiplies a value of 16 bits: `mantissa * 2^-shift`, rounded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weight {
-    /// Below 2^16.
+    /// Below 2^15.
     mantissa: u32,
-    /// From 2 to 32.
+    /// From 1 to 31.
     shift: u32,
 }
 
 impl Weight {
     pub(super) const ZERO: Self = Self {
         mantissa: 0,
-        shift: 2,
+        shift: 1,
     };
 
     /// The product; halves round up.
     pub(super) const fn of(self, value: u32) -> u32 {
-        (((self.mantissa * value) >> (self.shift - 1)) + 1) >> 1
+        (self.mantissa * value + (1 << (self.shift - 1))) >> self.shift
     }
 }
 
@@ -195,6 +202,7 @@ impl<'a> FrameMix<'a> {
     /// # Errors
     /// Slices that do not fit the atlas; weights that are negative or not finite; [`RelightError::Range`] with more than 1000
     /// lights.
+    #[inline(never)]
     pub fn new(
         atlas: &Atlas,
         full: &[Rgb],
@@ -320,6 +328,7 @@ impl<'a> FrameMix<'a> {
     }
 
     /// Of the lights that are not in tiles.
+    #[inline(never)]
     fn brightest_of_rows<K: Known>(&self, atlas: &Atlas) -> [u32; 3] {
         let codes = (0..).map_while(|light| atlas.code(light));
         let stride = codes.map(Code::bytes).sum::<usize>();
@@ -354,14 +363,17 @@ impl<'a> FrameMix<'a> {
 
     /// The gains of [`Finish`]; `None` where its error is [`RelightError::Range`].
     #[inline(never)]
-    fn shown(&self, runs: &[Run], exposure: f32, white: u16) -> Option<[Gain; 3]> {
+    fn shown(&self, runs: &[Run], exposure: f32, white: u16) -> Option<[Shown; 3]> {
         let is_positive = (1..0x7f80_0000).contains(&exposure.to_bits());
         let white = Wide::new(white.into(), -(STEPS.ilog2() as i32));
         let shown = Wide::from_float(exposure).times(Wide::from_float(FRAC_1_PI));
         let shown = shown.times(white);
         let gains = self.full_scale.map(|scale| Gain::new(shown.times(scale)));
-        let fits = runs.iter().all(|run| factors(gains, run).is_some());
-        (is_positive && fits).then_some(gains)
+        let fits = |run: &Run| {
+            let mut channels = gains.iter().zip(run.reflectance);
+            channels.all(|(gain, reflectance)| gain.fits(reflectance))
+        };
+        (is_positive && runs.iter().all(fits)).then(|| gains.map(Shown::new))
     }
 
     /// Sets the levels of a light: shares of its full weight, 2^-16 each; without such a light nothing happens.
@@ -462,7 +474,9 @@ pub struct Run {
 #[derive(Debug)]
 pub struct Finish<'a, T> {
     runs: &'a [Run],
-    gains: [Gain; 3],
+    /// Of all runs.
+    elements: usize,
+    gains: [Shown; 3],
     pub(super) tone: &'a T,
 }
 
@@ -480,15 +494,26 @@ impl<'a, T: Encode> Finish<'a, T> {
         exposure: f32,
         tone: &'a T,
     ) -> Result<Self, RelightError> {
-        check_runs(runs, atlas.element_count() as usize)?;
+        let elements = atlas.element_count() as usize;
+        check_runs(runs, elements)?;
         let gains = mix.shown(runs, exposure, tone.white());
         let gains = gains.ok_or(RelightError::Range)?;
-        Ok(Self { runs, gains, tone })
+        Ok(Self {
+            runs,
+            elements,
+            gains,
+            tone,
+        })
     }
 
-    /// Whether the runs are so many elements.
+    /// Whether there are so many elements.
     pub(super) fn check(&self, elements: usize) -> Result<(), RelightError> {
-        check_runs(self.runs, elements)
+        let expected = self.elements as u32;
+        if elements == self.elements {
+            Ok(())
+        } else {
+            Err(RelightError::Elements { expected })
+        }
     }
 
     /// Calls `f` with the pixels of every run and what multiplies their sums.
@@ -498,35 +523,48 @@ impl<'a, T: Encode> Finish<'a, T> {
         mut pixels: &mut [T::Pixel],
         mut f: impl FnMut(&mut [T::Pixel], [u16; 3]),
     ) -> Result<(), RelightError> {
-        check_runs(self.runs, pixels.len())?;
+        self.check(pixels.len())?;
         for run in self.runs {
             let own = pixels.split_off_mut(..run.elements as usize);
-            let factors = factors(self.gains, run).unwrap_or_default();
+            let ([r, g, b], [gain_r, gain_g, gain_b]) = (run.reflectance, self.gains);
+            let factors = [gain_r.factor(r), gain_g.factor(g), gain_b.factor(b)];
             f(own.unwrap_or_default(), factors);
         }
         Ok(())
     }
 }
 
-/// What multiplies the sums of a run, in 2^-16 steps of 2^-11 of the full scale; `None` beyond 16 bits.
-#[inline(never)]
-fn factors(gains: [Gain; 3], run: &Run) -> Option<[u16; 3]> {
-    let ([r, g, b], [gain_r, gain_g, gain_b]) = (run.reflectance, gains);
-    let factor = |reflectance: u16, gain: Gain| {
-        let product = u32::from(gain.mantissa) * u32::from(reflectance);
-        // Between 0 and 31 for everything that fits and does not vanish.
-        match u32::try_from(-i32::from(gain.exponent)) {
-            Ok(shift @ 0..=31) => u16::try_from(product >> shift).ok(),
-            Ok(_) => Some(0),
-            Err(_) => (product == 0).then_some(0),
+/// What multiplies a reflectance, `mantissa * 2^-shift`, for a factor of sums in 2^-16 steps of 2^-11 of the full scale.
+#[derive(Clone, Copy, Debug)]
+struct Shown {
+    mantissa: u16,
+    /// Up to 31.
+    shift: u16,
+}
+
+impl Shown {
+    fn new(gain: Gain) -> Self {
+        match u16::try_from(-gain.exponent) {
+            Ok(shift @ 0..=31) => Self {
+                mantissa: gain.mantissa,
+                shift,
+            },
+            // Vanishes; or [`Gain::fits`] black only.
+            _ => Self {
+                mantissa: 0,
+                shift: 0,
+            },
         }
-    };
-    Some([factor(r, gain_r)?, factor(g, gain_g)?, factor(b, gain_b)?])
+    }
+
+    const fn factor(self, reflectance: u16) -> u16 {
+        ((self.mantissa as u32 * reflectance as u32) >> self.shift) as u16
+    }
 }
 
 /// Whether the runs are so many elements.
 #[inline(never)]
-pub(super) fn check_runs(runs: &[Run], elements: usize) -> Result<(), RelightError> {
+fn check_runs(runs: &[Run], elements: usize) -> Result<(), RelightError> {
     let left = runs.iter().try_fold(elements, |left, run| {
         left.checked_sub(run.elements as usize)
     });
