@@ -3,7 +3,7 @@
 //! The rows of all patches of the paper's room. A pair is an element and a patch of which neither is
 //! wholly behind the other; the others are found out first and cost little. `open` has no
 //! blockers; the others cut out the shadows of all 20 surfaces, one after the other or those that
-//! the tree finds in the shaft of the pair. `point` is Lambert's formula alone, one point and one quad. `pair` is the
+//! the tree finds in the shaft of the pair; `estimated` is what missing rows get. `point` is Lambert's formula alone, one point and one quad. `pair` is the
 //! host's exact factor of two unit squares with its error: far, near, with a common edge, and behind a plate.
 
 mod scenes;
@@ -12,7 +12,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput};
 use glam::{DVec3, Vec3};
-use relume::form_factor::{self, point_to_polygon};
+use relume::form_factor::{self, Shooter, point_to_polygon};
 use relume::mesh::Mesh;
 use relume::visibility::{Obstacle, Occluders, Shaft, Visibility};
 use relume_host::builtin::PaperLamps;
@@ -71,6 +71,9 @@ fn rows(criterion: &mut Criterion) {
     group.bench_function("exact, tree", |bencher| {
         bencher.iter(|| all_rows(&mesh, &bvh, &mut row));
     });
+    group.bench_function("estimated, tree", |bencher| {
+        bencher.iter(|| all_estimates(&mesh, &bvh, &mut row));
+    });
     group.finish();
 }
 
@@ -98,6 +101,14 @@ fn pairs(criterion: &mut Criterion) {
 fn all_rows(mesh: &Mesh, visibility: &impl Visibility, row: &mut [f32]) {
     for patch in 0..mesh.patches.len() as u32 {
         form_factor::row(mesh, patch, visibility, row);
+        black_box(&row);
+    }
+}
+
+fn all_estimates(mesh: &Mesh, visibility: &impl Visibility, row: &mut [f32]) {
+    for patch in 0..mesh.patches.len() as u32 {
+        let shooter = Shooter::of_patch(mesh, patch, visibility).expect("a patch of the mesh");
+        form_factor::estimate(mesh, &shooter, 0, visibility, row);
         black_box(&row);
     }
 }

@@ -4,6 +4,8 @@
 //! Whatever is not installed is a failure in CI (variable `CI`); elsewhere a test says what it did not run.
 
 #[expect(dead_code, reason = "the bare-metal images use the rest")]
+mod emulator;
+#[expect(dead_code, reason = "the bare-metal images use the rest")]
 mod inputs;
 
 use std::fs;
@@ -12,6 +14,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
+use emulator::{modelled, write_rows};
 use inputs::{Input, hash, inputs};
 use relume::atlas::Atlas;
 use relume::code::Code;
@@ -121,7 +124,7 @@ fn cases() -> &'static [Case] {
 }
 
 /// Three bytes for every element.
-fn bytes_of<F: Form>(input: &Input, mut table: F::Table<1>) -> Vec<u8> {
+fn bytes_of<F: Form>(input: &Input, mut table: F::Table) -> Vec<u8> {
     let atlas = Atlas::parse(&input.atlas).unwrap();
     let mut room = vec![FrameLight::EMPTY; input.full.len()];
     let mut mix = FrameMix::new(&atlas, &input.full, &mut room).unwrap();
@@ -144,9 +147,9 @@ impl Case {
         changed[CHANGED] = second[CHANGED];
         let frame = |levels: &[[u16; 3]]| hash(&input.in_integers(levels));
         let bytes = if input.name.starts_with("lum") {
-            bytes_of::<Lum>(&input, [[0]; 256])
+            bytes_of::<Lum>(&input, Lum::EMPTY)
         } else {
-            bytes_of::<Colour>(&input, [[[0]; 256]; 3])
+            bytes_of::<Colour>(&input, Colour::EMPTY)
         };
         let expected = vec![
             ("full_565", frame(second)),
@@ -260,20 +263,17 @@ fn rows(target: &str, case: &Case, said: &str, size: Option<[u64; 2]>) -> Vec<Va
             row["per_frame"] = frame.into();
             row["per_frame_warm"] = frame.into();
             row["per_element_light"] = (f64::from(frame) / f64::from(share)).into();
+            let stack = number(said, "stack").unwrap();
             row["flash"] = flash.into();
-            row["ram"] = ram.into();
+            row["ram"] = (ram + u64::from(stack)).into();
+            row["stack"] = stack.into();
+            for (key, value) in modelled(target, frame.into()) {
+                row[key] = value;
+            }
         }
         row
     };
     kernels.map(row).into()
-}
-
-/// Leaves rows, one a line, where `tests/firmware/run` finds them.
-fn write_rows(target: &str, rows: &[Value]) {
-    let folder = root().join("target/firmware/c-rows");
-    fs::create_dir_all(&folder).unwrap();
-    let lines: String = rows.iter().map(|row| format!("{row}\n")).collect();
-    fs::write(folder.join(target), lines).unwrap();
 }
 
 #[test]

@@ -3,7 +3,7 @@
 mod bake;
 
 use bake::{baked, exact, room};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use relume::color::Rgb;
 use relume::form_factor;
 use relume::scene::{Emission, Luminaire, Source, Surface};
@@ -55,6 +55,37 @@ fn every_furnace_reaches_its_closed_form() {
             assert!(
                 largest < everywhere,
                 "{name}, rho {reflectance}: {largest} off"
+            );
+        }
+    }
+}
+
+#[test]
+fn nothing_shows_through_the_walls_of_a_furnace() {
+    let reflectance = 0.8;
+    for method in [Method::Gather, Method::Rows] {
+        let mut builtin = white_furnace(reflectance, 1.0).expect("a legal furnace");
+        let settings = Settings {
+            method,
+            ..exact(&builtin)
+        };
+        // Black squares in the planes of the walls, which emit and so lie on top.
+        let scene = &mut builtin.scene;
+        let walls = scene.surfaces.clone();
+        let squares = walls.iter().zip(100..).map(|(wall, number)| {
+            let square = wall.polygon().part(Vec2::splat(0.2), Vec2::splat(0.9));
+            Surface::new(number, square.vertices(), Rgb::BLACK).expect("a square")
+        });
+        scene.surfaces.splice(0..0, squares);
+        scene.textures.splice(0..0, walls.iter().map(|_| None));
+        let solution = baked(scene, &settings);
+        assert_eq!(solution.surfaces.len(), 12);
+        let expected = 1.0 / (1.0 - reflectance);
+        for (element, value) in solution.contributions.iter().enumerate() {
+            // As in the furnace without them.
+            assert!(
+                (value.g / expected - 1.0).abs() < 4e-5,
+                "{method:?}, element {element}: {value:?} instead of {expected}"
             );
         }
     }

@@ -1,13 +1,18 @@
 //! The solver on microcontrollers, in an emulator: the same pixels as here, in so many instructions.
 
+mod emulator;
 mod inputs;
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::collections::BTreeSet;
+use std::process::Command;
 use std::{env, fs, iter};
 
-use inputs::device_room::{Memory, POLYGONS, Polygon, bake};
-use inputs::{Input, hash, inputs, room_polygons, write_if_new};
+use emulator::{
+    SMALL, TARGETS, build, emulate, has_tools, image, modelled, root, said, size, work, write_rows,
+};
+use inputs::device_drawn::{self, Screen, draw};
+use inputs::device_room::{DirectMemory, MOVING_POLYGONS, Memory, POLYGONS, Polygon, bake, direct};
+use inputs::{Input, drawn_atlas, hash, inputs, moving_polygons, room_polygons, write_if_new};
 use relume::atlas::Atlas;
 use relume_host::device_cost::{Core, DeviceCost};
 use serde_json::{Value, json};
@@ -23,48 +28,8 @@ const IMAGES: [(&str, &str, &str); 7] = [
     ("full_tiles_960", "full_tiles_565", "tiles_960x8"),
 ];
 
-/// Cortex-M0, M3 and M4F.
-const TARGETS: [&str; 3] = [
-    "thumbv6m-none-eabi",
-    "thumbv7m-none-eabi",
-    "thumbv7em-none-eabihf",
-];
-
-/// The one without hardware for floats.
-const SMALL: &str = TARGETS[0];
-
 /// The light that the `change` images change.
 const CHANGED: usize = 1;
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
-fn work() -> PathBuf {
-    root().join("target/firmware")
-}
-
-/// Whether all tools are there; else says what to install, and fails on a build server.
-fn has_tools() -> bool {
-    let works = |program: &str| Command::new(program).arg("--version").output().is_ok();
-    let missing: Vec<&str> = ["qemu-system-arm", "arm-none-eabi-size", "arm-none-eabi-nm"]
-        .into_iter()
-        .filter(|program| !works(program))
-        .collect();
-    let script = Command::new("bash")
-        .args(["-c", "source .ci/bare-metal.sh thumbv6m-none-eabi --check"])
-        .current_dir(root())
-        .status();
-    if missing.is_empty() && script.is_ok_and(|status| status.success()) {
-        return true;
-    }
-    let told = format!(
-        "no firmware was built or run; missing: {missing:?} or a compiler for it. Install all with: bash .ci/bare-metal.sh all"
-    );
-    assert!(env::var_os("CI").is_none(), "{told}");
-    eprintln!("\nSKIPPED: {told}\n");
-    false
-}
 
 /// The triple of this machine.
 fn host() -> String {
@@ -88,78 +53,6 @@ fn images(target: &str) -> Vec<(&'static str, &'static str, &'static str)> {
     images.filter(|image| !others.contains(&image.0)).collect()
 }
 
-/// Builds images for a target.
-fn build(target: &str, images: &[&str], options: &str) -> Output {
-    let bins = images.join(" --bin ");
-    let script = format!(
-        "source .ci/bare-metal.sh {target} && cd tests/firmware && \
-         cargo build --release --locked --target {target} --bin {bins} {options}"
-    );
-    Command::new("bash")
-        .args(["-c", &script])
-        .current_dir(root())
-        .env("CARGO_TARGET_DIR", work().join("target"))
-        .env("FIRMWARE_DATA", work().join("data"))
-        // Those of the cargo that runs this test.
-        .env_remove("CARGO")
-        .env_remove("RUSTC")
-        .env_remove("RUSTFLAGS")
-        .output()
-        .expect("bash")
-}
-
-fn image(target: &str, name: &str) -> PathBuf {
-    work()
-        .join("target")
-        .join(target)
-        .join("release")
-        .join(name)
-}
-
-/// Starts an image in the emulator of its target: exit status and what it said.
-fn emulate(target: &str, name: &str) -> (Option<i32>, String) {
-    let config = fs::read_to_string(root().join("tests/firmware/.cargo/config.toml"));
-    let config = config.expect("it is checked in");
-    let (_, own) = config
-        .split_once(&format!("[target.{target}]"))
-        .expect("a runner");
-    let runner = own.split('"').nth(1).expect("in quotes");
-    let output = Command::new("timeout")
-        .arg("120")
-        .args(runner.split(' '))
-        .arg(image(target, name))
-        .output()
-        .expect("the emulator");
-    let said = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
-    (output.status.code(), said.into_owned())
-}
-
-/// A number that an image said.
-fn said(text: &str, name: &str) -> Option<u32> {
-    let line = text
-        .lines()
-        .find_map(|line| line.strip_prefix(&format!("{name} 0x")));
-    u32::from_str_radix(line?.trim(), 16).ok()
-}
-
-/// Bytes of flash and of static RAM.
-fn size(image: &Path) -> [u64; 2] {
-    let output = Command::new("arm-none-eabi-size")
-        .args(["-A"])
-        .arg(image)
-        .output();
-    let text = String::from_utf8(output.expect("binutils").stdout).expect("plain text");
-    let of = |section: &str| {
-        let line = text
-            .lines()
-            .find(|line| line.split_whitespace().next() == Some(section));
-        let bytes = line.and_then(|line| line.split_whitespace().nth(1)?.parse().ok());
-        bytes.unwrap_or(0_u64)
-    };
-    let flash = of(".vector_table") + of(".text") + of(".rodata") + of(".data");
-    [flash, of(".data") + of(".bss") + of(".uninit")]
-}
-
 /// The row of one image on one target.
 fn row(target: &str, (name, kernel, _): (&str, &str, &str), input: &Input) -> Value {
     let (status, text) = emulate(target, name);
@@ -174,7 +67,7 @@ fn row(target: &str, (name, kernel, _): (&str, &str, &str), input: &Input) -> Va
     let share = if is_change { n } else { n * k };
     let [flash, statics] = size(&image(target, name));
     let stack = number("stack");
-    json!({
+    let mut row = json!({
         "target": target,
         "kernel": kernel,
         "image": name,
@@ -187,7 +80,11 @@ fn row(target: &str, (name, kernel, _): (&str, &str, &str), input: &Input) -> Va
         "ram": statics + u64::from(stack),
         "stack": stack,
         "hash": format!("{:08x}", number("hash")),
-    })
+    });
+    for (key, value) in modelled(target, per_frame.into()) {
+        row[key] = value;
+    }
+    row
 }
 
 /// Pixels that differ from the `f32` ones by so many steps of RGB565.
@@ -248,10 +145,109 @@ fn the_m4f_bakes_the_papers_room() {
         (hash ^ u32::from(*byte)).wrapping_mul(0x0100_0193)
     });
     assert_eq!(said(&text, "atlas"), Some(atlas));
-    let [_, statics] = size(&image(TARGETS[2], "bake"));
+    let [flash_bytes, statics] = size(&image(TARGETS[2], "bake"));
     let ram = statics + u64::from(said(&text, "stack").expect("it says"));
     eprintln!("RAM: {ram}");
     assert!(ram <= 192 << 10, "{ram} bytes of RAM");
+    let number = |name| said(&text, name).expect("it says");
+    let instructions = 1000 * u64::from(number("thousands"));
+    let mut row = json!({
+        "target": TARGETS[2], "kernel": "bake", "image": "bake", "n": 960, "k": 3,
+        "rows": here.rows, "per_element_light": instructions as f64 / (960.0 * 3.0),
+        "per_frame": instructions, "per_frame_warm": instructions,
+        "flash": flash_bytes, "ram": ram, "stack": number("stack"),
+        "hash": format!("{:08x}", number("contributions")),
+    });
+    for (key, value) in modelled(TARGETS[2], instructions) {
+        row[key] = value;
+    }
+    write_rows("bake", &[row]);
+}
+
+#[test]
+fn the_m4f_adds_direct_light_with_shadows_to_a_frame() {
+    if !has_tools() {
+        return;
+    }
+    let data = work().join("data");
+    fs::create_dir_all(&data).expect("a folder that can be written to");
+    let polygons = moving_polygons();
+    write_if_new(&data.join("moving.rs"), format!("{polygons:?}").as_bytes());
+    let polygons: [Polygon; MOVING_POLYGONS] = polygons.try_into().expect("as many");
+    let uncounted = |row: &mut dyn FnMut()| {
+        row();
+        0
+    };
+    let here = direct(&polygons, &mut Box::new(DirectMemory::new()), uncounted);
+    let here = here.expect("it fits");
+
+    let built = build(TARGETS[2], &["direct"], "");
+    let told = String::from_utf8_lossy(&built.stderr);
+    assert!(built.status.success(), "{told}");
+    let (status, text) = emulate(TARGETS[2], "direct");
+    assert_eq!(status, Some(0), "{text}");
+    let number = |name| said(&text, name).expect("it says");
+    assert_eq!((number("hash"), number("lit")), (here.hash, here.lit));
+    let instructions = 1000 * u64::from(number("thousands"));
+    let [flash, statics] = size(&image(TARGETS[2], "direct"));
+    let mut row = json!({
+        "target": TARGETS[2], "kernel": "direct", "image": "direct", "n": 1920, "k": 1,
+        "lit": here.lit, "per_element_light": instructions as f64 / 1920.0,
+        "per_frame": instructions, "per_frame_warm": instructions,
+        "flash": flash, "ram": statics + u64::from(number("stack")), "stack": number("stack"),
+        "hash": format!("{:08x}", here.hash),
+    });
+    for (key, value) in modelled(TARGETS[2], instructions) {
+        row[key] = value;
+    }
+    eprintln!("{row}");
+    write_rows("direct", &[row]);
+}
+
+#[test]
+fn the_larger_cores_draw_what_the_host_draws() {
+    if !has_tools() {
+        return;
+    }
+    let data = work().join("data");
+    fs::create_dir_all(&data).expect("a folder that can be written to");
+    let atlas = drawn_atlas();
+    write_if_new(&data.join("drawn.atlas"), &atlas);
+    let mut screen = Screen::new();
+    draw(
+        &atlas,
+        &mut Box::new(device_drawn::Memory::new()),
+        &mut screen,
+    )
+    .expect("its own room");
+    let pixels = screen.data().as_chunks().0.iter();
+    let pixels: Vec<u16> = pixels.map(|pixel| u16::from_le_bytes(*pixel)).collect();
+    let shades: BTreeSet<u16> = pixels.iter().copied().collect();
+    assert!(shades.len() > 100, "{} shades", shades.len());
+
+    let mut rows = Vec::new();
+    for target in TARGETS.into_iter().filter(|target| *target != SMALL) {
+        let built = build(target, &["draw"], "--features draw");
+        let told = String::from_utf8_lossy(&built.stderr);
+        assert!(built.status.success(), "{told}");
+        let (status, text) = emulate(target, "draw");
+        assert_eq!(status, Some(0), "{text}");
+        let number = |name| said(&text, name).expect("it says");
+        assert_eq!(number("hash"), hash(&pixels), "{target}");
+        let [flash, statics] = size(&image(target, "draw"));
+        let mut row = json!({
+            "target": target, "kernel": "draw", "image": "draw", "n": 960, "k": 3,
+            "per_frame": number("per_frame"), "per_frame_warm": number("per_frame"),
+            "flash": flash, "ram": statics + u64::from(number("stack")), "stack": number("stack"),
+            "hash": format!("{:08x}", number("hash")),
+        });
+        for (key, value) in modelled(target, number("per_frame").into()) {
+            row[key] = value;
+        }
+        eprintln!("{row}");
+        rows.push(row);
+    }
+    write_rows("draw", &rows);
 }
 
 #[test]
@@ -289,8 +285,7 @@ fn images_give_the_pixels_of_the_host_within_their_budgets() {
             rows.push(row(target, image, input.expect("an input")));
         }
     }
-    let text = format!("{:#}\n", json!({"rows": rows}));
-    write_if_new(&work().join("rows.json"), text.as_bytes());
+    write_rows("images", &rows);
     let shape = |row: &Value| ["kernel", "n", "k"].map(|key| row[key].to_string());
     for row in &rows {
         for other in rows.iter().filter(|other| shape(other) == shape(row)) {

@@ -1,4 +1,4 @@
-//! `relume study stability`: every known failure is tried, and nearly every bound holds.
+//! `relume study stability`: every known failure is tried, and every bound holds.
 
 use std::fs;
 use std::path::Path;

@@ -285,15 +285,12 @@ const GATHERED: [Gathered; 7] = [
     Gathered::open("cornell_mitsuba"),
     Gathered::open("tinyobj_cornell"),
     Gathered::open("bevy_cornell"),
-    // Measured 94.06 where 95 is wanted: elements reach through the walls of hollows, which are dark inside.
-    Gathered {
-        within: 93.5,
-        ..Gathered::open("gazebo")
-    },
+    Gathered::open("gazebo"),
 ];
 
-/// The gazebo's lamp shines into a hollow alone: what the reference says to be exactly 0 elsewhere is
-/// 1e-5 of its largest value, so 1680 of 1800 values are not within anything of nothing.
+/// The gazebo's lamp shines into a hollow alone: where the reference says exactly 0, rounding leaves slivers
+/// of the lamp between the surfaces that hide it, up to 1e-7 of its largest value, so 1680 of 1800 values
+/// are not within anything of nothing.
 const HOLLOW: (&str, &str) = ("gazebo", "light_lamp");
 
 #[test]
@@ -380,8 +377,8 @@ fn elements_of_the_seed_rooms_agree_with_averages_over_them() {
             "{scene} on the paper's mesh, element averages: worst light {light}, L2 {:.2} %\n",
             worst.l2()
         ));
-        // Measured: 2.9 and 3.8 %, most of it the substructuring error of 1 m patches.
-        assert!(worst.l2() <= 8.0, "{scene}, {light}: {:.2} %", worst.l2());
+        // What is wanted; measured: 0.7 and 1.3 %.
+        assert!(worst.l2() <= 3.0, "{scene}, {light}: {:.2} %", worst.l2());
     }
 }
 

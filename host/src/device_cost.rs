@@ -57,16 +57,16 @@ impl DeviceCost {
             f64::from(atlas.element_count()),
             f64::from(atlas.light_count()),
         );
-        let lanes = u64::from(atlas.light_count().next_power_of_two());
+        let lights = u64::from(atlas.light_count());
         let is_lum = atlas.is_all_in(|code| code == Code::Lum8);
         let is_colour = atlas.is_all_in(|code| code.bytes() == 3);
         let elements = u64::from(atlas.element_count());
-        let (model, table) = if is_lum && (core != Core::M0 || 1024 * lanes <= SMALL_TABLE) {
-            (lum(core), 1024 * lanes)
+        let (model, table) = if is_lum && (core != Core::M0 || 1024 * lights <= SMALL_TABLE) {
+            (with_tables(core, true), 1024 * lights)
         } else if is_lum {
             (LUM_IN_BATCHES, 1024 + 4 * elements)
         } else if is_colour {
-            (colour(core), 1536 * lanes)
+            (with_tables(core, false), 1536 * lights)
         } else {
             (any(core), 2 * table_length(atlas) as u64 + 6 * elements)
         };
@@ -92,50 +92,36 @@ struct Model {
     stack: u64,
 }
 
-const fn lum(core: Core) -> Model {
-    let (element, code_of_light, code) = match core {
-        Core::M0 => (35.1, 5.0, 37_000),
-        Core::M3 => (24.6, 4.03, 36_500),
-        Core::M4F => (26.0, 3.98, 36_700),
+/// A table of every light, of luminance or of three channels.
+const fn with_tables(core: Core, is_lum: bool) -> Model {
+    let (element, code_of_light, code) = match (core, is_lum) {
+        (Core::M0, true) => (32.0, 5.0, 13_500),
+        (_, true) => (21.5, 3.41, 20_300),
+        (Core::M0, false) => (27.5, 16.1, 21_700),
+        (_, false) => (17.4, 11.05, 35_800),
     };
     Model {
         element,
         code_of_light,
         light: 0.0,
         code,
-        stack: 1_900,
+        stack: 2_000,
     }
 }
 
 /// On the M0, a table filled for every light of every frame.
 const LUM_IN_BATCHES: Model = Model {
-    element: 30.0,
-    code_of_light: 7.05,
-    light: 13_200.0,
-    code: 39_000,
+    element: 27.0,
+    code_of_light: 7.25,
+    light: 11_000.0,
+    code: 16_000,
     stack: 2_500,
 };
 
-const fn colour(core: Core) -> Model {
-    let (element, code_of_light, code) = match core {
-        Core::M0 => (27.5, 15.5, 37_300),
-        Core::M3 => (18.4, 12.6, 34_900),
-        Core::M4F => (17.4, 12.6, 36_700),
-    };
-    Model {
-        element,
-        code_of_light,
-        light: 0.0,
-        code,
-        stack: 1_900,
-    }
-}
-
 const fn any(core: Core) -> Model {
     let (code_of_light, code) = match core {
-        Core::M0 => (900.0, 40_000),
-        Core::M3 => (455.0, 39_000),
-        Core::M4F => (440.0, 39_000),
+        Core::M0 => (900.0, 38_000),
+        _ => (509.0, 38_000),
     };
     Model {
         element: 25.0,

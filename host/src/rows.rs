@@ -12,7 +12,7 @@ use relume::color::Rgb;
 use relume::form_factor::{self, Receiver, Shooter, View};
 use relume::geometry::{Polygon, from_unit_square};
 use relume::luminaire;
-use relume::mesh::Mesh;
+use relume::mesh::{Face, Mesh};
 use relume::refine::Refinement;
 use relume::scene::{Luminaire, Scene};
 use relume::visibility::{OccludersAndBodies, Shaft, Visibility};
@@ -57,8 +57,8 @@ pub trait RowFiller {
     }
 
     /// The same for a whole lamp, which may be large and seen through much.
-    fn lamp(&self, mesh: &Mesh, polygon: &Polygon, row: &mut [f32]) {
-        self.shooter(mesh, &Shooter::new(*polygon), row);
+    fn lamp(&self, mesh: &Mesh, lamp: &Face, row: &mut [f32]) {
+        self.shooter(mesh, &Shooter::of_face(lamp, self.visibility()), row);
     }
 
     /// Estimates of the form factors from every element to a polygon.
@@ -107,7 +107,7 @@ pub fn direct(
     };
     for face in mesh.faces {
         if let Some(emission) = face.emission {
-            filler.lamp(mesh, &face.polygon, &mut row);
+            filler.lamp(mesh, face, &mut row);
             add(emission.light, emission.share, &row);
         }
     }
@@ -221,20 +221,21 @@ impl RowFiller for Parallel<'_> {
     fn estimate(&self, _: &Mesh, polygon: &Polygon, row: &mut [f32]) {
         let shooter = Shooter::new(*polygon);
         self.fill(row, |receiver, range| {
-            if shooter.is_out_of_sight(receiver) {
+            let view = shooter.seen_by(receiver, self.bvh);
+            if view.is_hidden() {
                 return Vec::new();
             }
-            let narrowed = self.bvh.narrowed(&shaft(polygon, receiver));
             let receivers = self.receivers[range.clone()].iter();
             receivers
-                .map(|receiver| shooter.estimate(receiver.polygon(), &narrowed))
+                .map(|receiver| view.estimate(receiver, self.bvh))
                 .collect()
         });
     }
 
-    fn lamp(&self, _: &Mesh, polygon: &Polygon, row: &mut [f32]) {
+    fn lamp(&self, _: &Mesh, lamp: &Face, row: &mut [f32]) {
+        let lamp = Shooter::of_face(lamp, self.bvh);
         self.fill(row, |receiver, range| {
-            self.lamp_factors(polygon, receiver, range, None)
+            self.lamp_factors(&lamp, receiver, range, None)
         });
     }
 }
@@ -270,32 +271,31 @@ impl Parallel<'_> {
     /// one is a quarter of, and how often that has been quartered.
     fn lamp_factors(
         &self,
-        lamp: &Polygon,
+        lamp: &Shooter,
         receiver: &Polygon,
         range: &Range<usize>,
         whole: Option<(&Narrowed, u32)>,
     ) -> Vec<f32> {
-        let shooter = Shooter::new(*lamp);
-        if shooter.is_out_of_sight(receiver) {
+        if lamp.is_out_of_sight(receiver) {
             return Vec::new();
         }
-        let shaft = shaft(lamp, receiver);
+        let shaft = shaft(lamp.polygon(), receiver);
         let (narrowed, depth) = match whole {
             None => (self.bvh.narrowed(&shaft), 0),
             Some((whole, depth)) => (whole.narrowed(&shaft), depth + 1),
         };
         let is_many = narrowed.blockers() > MANY_BLOCKERS;
-        if is_many && !self.finds_a_way(receiver, lamp, range, depth) {
+        if is_many && !self.finds_a_way(receiver, lamp.polygon(), range, depth) {
             return Vec::new();
         }
         if !is_many || depth == MOST_QUARTERINGS {
-            let view = shooter.seen_by(receiver, &narrowed);
+            let view = lamp.seen_by(receiver, &narrowed);
             return self.seen(&view, range, &narrowed);
         }
         let mut sum = vec![0.0; range.len()];
-        for quarter in quarters(lamp) {
+        for quarter in quarters(lamp.polygon()) {
             let whole = Some((&narrowed, depth));
-            let factors = self.lamp_factors(&quarter, receiver, range, whole);
+            let factors = self.lamp_factors(&lamp.part(quarter), receiver, range, whole);
             for (sum, factor) in sum.iter_mut().zip(factors) {
                 *sum += factor;
             }
@@ -454,8 +454,9 @@ mod tests {
         let meshed = Meshed::new(&scene, Some(1.0), Some(0.5), &mut go_on).unwrap();
         let mesh = meshed.mesh().view();
         let mut row = vec![0.0; mesh.elements.len()];
-        let lamp = meshed.view().unwrap().surfaces()[0];
-        Parallel::new(&mesh, meshed.bvh()).lamp(&mesh, lamp.polygon(), &mut row);
+        let mut faces = mesh.faces.iter();
+        let lamp = faces.find(|face| face.emission.is_some()).unwrap();
+        Parallel::new(&mesh, meshed.bvh()).lamp(&mesh, lamp, &mut row);
         let receivers: Vec<_> = element_receivers(&mesh)
             .into_iter()
             .map(|(receiver, _)| receiver)

@@ -172,16 +172,21 @@ impl SurfaceTexture {
         }
     }
 
-    /// Where a point of the surface lies in the image, in texels.
-    fn place(&self, at: Vec2) -> Vec2 {
-        let place = match *self.corners {
+    /// Texture coordinates of the point of the surface with these parameters.
+    #[must_use]
+    pub fn coordinates(&self, at: Vec2) -> Vec2 {
+        match *self.corners {
             [a, b, c] => a + (b - a) * at.x + (c - a) * at.y,
             [a, b, c, d] => {
                 a + (b - a) * at.x + (d - a) * at.y + ((c - d) - (b - a)) * (at.x * at.y)
             }
             _ => Vec2::ZERO,
-        };
-        place * Vec2::new(self.image.width as f32, self.image.height as f32)
+        }
+    }
+
+    /// Where that lies in the image, in texels.
+    fn place(&self, at: Vec2) -> Vec2 {
+        self.coordinates(at) * Vec2::new(self.image.width as f32, self.image.height as f32)
     }
 
     /// Adds the texels that a triangle covers.

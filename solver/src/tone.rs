@@ -88,10 +88,12 @@ impl Exposure {
 
 /// Linear steps to RGB565 by look-up, without floats: every step as its middle is encoded.
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub struct Rgb565Table {
-    white: u16,
-    five: [u8; STEPS as usize],
+    /// Of two steps each: a level of five bits is as wide as two of six.
+    five: [u8; STEPS as usize / 2],
     six: [u8; STEPS as usize],
+    white: u16,
 }
 
 impl Rgb565Table {
@@ -99,9 +101,9 @@ impl Rgb565Table {
     #[must_use]
     pub const fn new(white: u16) -> Self {
         Self {
+            five: encoded_steps(2, white, 31),
+            six: encoded_steps(1, white, 63),
             white,
-            five: encoded_steps(white, 31),
-            six: encoded_steps(white, 63),
         }
     }
 }
@@ -115,7 +117,7 @@ impl Encode for Rgb565Table {
 
     #[inline(always)]
     fn encode(&self, [r, g, b]: [u32; 3]) -> u16 {
-        let [r, b] = [r, b].map(|step| step_of(&self.five, step));
+        let (r, b) = (step_of(&self.five, r / 2), step_of(&self.five, b / 2));
         b | step_of(&self.six, g) << 5 | r << 11
     }
 }
@@ -133,7 +135,7 @@ impl Rgb888Table {
     pub const fn new(white: u16) -> Self {
         Self {
             white,
-            eight: encoded_steps(white, 255),
+            eight: encoded_steps(1, white, 255),
         }
     }
 }
@@ -152,27 +154,27 @@ impl Encode for Rgb888Table {
 }
 
 #[inline(always)]
-fn step_of(table: &[u8; STEPS as usize], step: u32) -> u16 {
+fn step_of<const N: usize>(table: &[u8; N], step: u32) -> u16 {
     // Not reached by the kernels, whose steps have 11 bits.
     u16::from(table.get(step as usize).copied().unwrap_or(u8::MAX))
 }
 
-/// The sRGB value, in `[0, levels]`, of the middle of every step.
-const fn encoded_steps(white: u16, levels: u32) -> [u8; STEPS as usize] {
-    let mut table = [0; STEPS as usize];
-    let (mut rest, mut step, mut level) = (table.as_mut_slice(), 1, 0);
+/// The sRGB value, in `[0, levels]`, of the middle of every so many steps.
+const fn encoded_steps<const N: usize>(width: u64, white: u16, levels: u32) -> [u8; N] {
+    let mut table = [0; N];
+    let (mut rest, mut step, mut level) = (table.as_mut_slice(), width, 0);
     while let Some((entry, after)) = rest.split_first_mut() {
         // A level begins in the middle between it and the one below, in 2^-12 of 255 codes.
         while level < levels {
             let begin = srgb_linear((2 * level + 1) * (255 << 11) / levels) as u64;
             // `(step / 2) / white < begin / 2^31`
-            if (step as u64) << 31 < 2 * begin * white as u64 {
+            if step << 31 < 2 * begin * white as u64 {
                 break;
             }
             level += 1;
         }
         *entry = level as u8;
-        (rest, step) = (after, step + 2);
+        (rest, step) = (after, step + 2 * width);
     }
     table
 }

@@ -9,6 +9,7 @@
 
 void say(const char *name, uint32_t value);
 uint32_t instructions(void);
+uint32_t largest_stack(void);
 
 static RelumeAtlas atlas;
 static RelumeFrame frame;
@@ -123,5 +124,6 @@ int main(void) {
     expect(relume_frame_change(&frame, CHANGED, &first[CHANGED]), RELUME_STATUS_OK, &wrong);
     say("undone_565", show(&wrong));
     refusals(&wrong);
+    say("stack", largest_stack());
     return wrong != 0;
 }

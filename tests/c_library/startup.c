@@ -1,5 +1,5 @@
 /* What relight.c needs on the emulated boards (see link.ld): vectors, memory as C expects it, a way to speak and to
- * end by semihosting, and a count of instructions. With `-icount shift=10` an instruction takes 1.024 us of virtual
+ * end by semihosting, the stack's high-water mark, and a count of instructions. With `-icount shift=10` an instruction takes 1.024 us of virtual
  * time, which a timer of the board measures. */
 
 #include <stddef.h>
@@ -64,6 +64,23 @@ uint32_t instructions(void) {
 }
 #endif
 
+/* What an unused word of the stack holds. */
+#define PAINT 0x5ac396e1u
+
+static void paint_stack(void) {
+    uint32_t mark;
+    for (volatile uint32_t *word = bss_end; word < &mark - 16; ++word)
+        *word = PAINT;
+}
+
+/* Bytes of the stack that were in use at some time. */
+uint32_t largest_stack(void) {
+    const volatile uint32_t *word = bss_end;
+    while (word < stack_top && *word == PAINT)
+        ++word;
+    return (uint32_t)((uintptr_t)stack_top - (uintptr_t)word);
+}
+
 static void reset(void) {
 #ifdef __ARM_FP
     REGISTER(0xe000ed88) |= 0xfu << 20; /* the floating-point unit, before the first float */
@@ -74,6 +91,7 @@ static void reset(void) {
         *to = *from++;
     for (uint32_t *to = bss_start; to < bss_end; ++to)
         *to = 0;
+    paint_stack();
     start_timer();
     finish((uint32_t)main());
 }

@@ -20,6 +20,8 @@ use relume_host::pack::{Format, Packing, pack};
 use relume_host::scene::OwnedScene;
 use relume_host::solution::Solution;
 
+#[path = "../firmware/src/drawn.rs"]
+pub mod device_drawn;
 #[path = "../firmware/src/room.rs"]
 pub mod device_room;
 
@@ -71,7 +73,13 @@ pub fn inputs() -> Vec<Input> {
     ]
 }
 
-fn input(name: &'static str, solution: &Solution, packing: Packing, quantity: Quantity) -> Input {
+/// An atlas of a solution without its mesh, its reflectances, and two mixes.
+pub fn input(
+    name: &'static str,
+    solution: &Solution,
+    packing: Packing,
+    quantity: Quantity,
+) -> Input {
     let format = Format {
         packing,
         quantity,
@@ -80,8 +88,9 @@ fn input(name: &'static str, solution: &Solution, packing: Packing, quantity: Qu
     let atlas = pack(solution, format).expect("it can be packed");
     let parsed = Atlas::parse(&atlas).expect("it was just packed");
     let (elements, lights) = (parsed.element_count(), parsed.light_count());
-    let end = format!("_{elements}x{lights}");
-    assert!(name.ends_with(&end), "{name} is {end}");
+    if let Some((_, shape)) = name.split_once('_') {
+        assert_eq!(shape, format!("{elements}x{lights}"), "{name}");
+    }
     let runs = match quantity {
         Quantity::Irradiance => runs(solution),
         _ => vec![Run {
@@ -142,7 +151,8 @@ fn reflectances(runs: &[Run]) -> impl Iterator<Item = Rgb> {
         .flat_map(move |run| iter::repeat_n(of(run), run.elements as usize))
 }
 
-fn relit(atlas: &Atlas, mix: &[Rgb]) -> Vec<Rgb> {
+/// The `f32` relight.
+pub fn relit(atlas: &Atlas, mix: &[Rgb]) -> Vec<Rgb> {
     let mut values = vec![0.0; table_length(atlas)];
     let table = DecodeTable::new(atlas, &mut values).expect("it is long enough");
     let mut irradiance = vec![Rgb::BLACK; atlas.element_count() as usize];
@@ -183,11 +193,10 @@ impl Input {
         let finish = finish.expect("the exposure is not that far from white");
         let mut pixels = vec![0; atlas.element_count() as usize];
         match self.name {
-            "lum_960x8" => self.table::<Lum, 8, 8>(&mix, [[0; 8]; 256], &finish, &mut pixels),
-            "lum_1920x30" => self.table::<Lum, 30, 32>(&mix, [[0; 32]; 256], &finish, &mut pixels),
-            "rgb_960x8" => {
-                self.table::<Colour, 8, 8>(&mix, [[[0; 8]; 256]; 3], &finish, &mut pixels)
-            }
+            "lum_960x8" => self.table::<Lum, 8>(&mix, &finish, &mut pixels),
+            "lum_1920x30" => self.table::<Lum, 30>(&mix, &finish, &mut pixels),
+            "rgb_960x8" => self.table::<Colour, 8>(&mix, &finish, &mut pixels),
+            "cornell" => self.table::<Colour, 1>(&mix, &finish, &mut pixels),
             _ => {
                 let mut values = vec![0; table_length(&atlas)];
                 let table = AnyTable::new(&atlas, &mix, &mut values).expect("it fits");
@@ -198,18 +207,18 @@ impl Input {
         pixels
     }
 
-    fn table<F: Form, const K: usize, const L: usize>(
+    fn table<F: Form, const K: usize>(
         &self,
         mix: &FrameMix,
-        mut table: F::Table<L>,
         finish: &Finish<Rgb565Table>,
         pixels: &mut [u16],
     ) {
         let atlas = Atlas::parse(&self.atlas).expect("an atlas");
-        for light in 0..K as u32 {
-            fill_table::<F, L>(&atlas, mix, light, &mut table).expect("a light");
+        let mut tables = [F::EMPTY; K];
+        for (light, table) in (0..).zip(&mut tables) {
+            fill_table::<F>(&atlas, mix, light, table).expect("a light");
         }
-        full::<F, K, L, _>(&atlas, &table, finish, pixels).expect("it fits");
+        full::<F, K, _>(&atlas, &tables, finish, pixels).expect("it fits");
     }
 
     /// Writes the atlas, and Rust that includes it.
@@ -218,12 +227,21 @@ impl Input {
         let path = folder.join(self.name).with_extension("atlas");
         let lights = self.full.len();
         let mut text = String::new();
-        let _ = writeln!(text, "/// Entries of a table of all codes.");
-        let _ = writeln!(
-            text,
-            "#[allow(dead_code)]\nconst LEVELS: usize = {};",
-            table_length(&atlas)
-        );
+        for (what, name, count) in [
+            (
+                "Entries of a table of all codes",
+                "LEVELS",
+                table_length(&atlas),
+            ),
+            (
+                "Pixels of a frame",
+                "ELEMENTS",
+                atlas.element_count() as usize,
+            ),
+        ] {
+            let _ = writeln!(text, "/// {what}.\n#[allow(dead_code)]");
+            let _ = writeln!(text, "const {name}: usize = {count};");
+        }
         let _ = writeln!(text, "static INPUT: Input<{lights}> = Input {{");
         let _ = writeln!(text, "    atlas: include_bytes!({path:?}),\n    full: [");
         for Rgb { r, g, b } in &self.full {
@@ -249,17 +267,42 @@ impl Input {
     }
 }
 
+/// The room of the moving light, whose 30 patches are no lamps here; one of 0.5 m hangs under the ceiling.
+pub fn moving_polygons() -> Vec<device_room::Polygon> {
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/scenes");
+    let moving = import::load(&scenes.join("moving_light.obj"), None).expect("our own scene");
+    let surfaces = moving.scene.surfaces.iter();
+    let dark = surfaces.filter(|surface| surface.emission().is_none());
+    let mut polygons: Vec<_> = dark.map(polygon).collect();
+    let corners =
+        [[2.75, 1.25], [3.25, 1.25], [3.25, 1.75], [2.75, 1.75]].map(|[x, z]| [x, 2.9, z]);
+    polygons.push((corners, [0.0; 3], Some(0)));
+    polygons
+}
+
+fn polygon(surface: &relume::scene::Surface) -> device_room::Polygon {
+    let mut vertices = [[0.0; 3]; 4];
+    for (to, from) in vertices.iter_mut().zip(surface.polygon().vertices()) {
+        *to = from.to_array();
+    }
+    let reflectance = surface.reflectance().get().to_array();
+    (vertices, reflectance, surface.emission().map(|e| e.light))
+}
+
+/// The atlas, with its mesh, of the paper's room with three lamps.
+pub fn drawn_atlas() -> Vec<u8> {
+    let room = solved(&paper_room(PaperLamps::Three).expect("a legal scene").scene);
+    let format = Format {
+        packing: Code::Display8.into(),
+        quantity: Quantity::Radiosity,
+        mesh: true,
+    };
+    pack(&room, format).expect("it can be packed")
+}
+
 /// The paper's room with three lamps: what `room` of the firmware bakes.
 pub fn room_polygons() -> Vec<device_room::Polygon> {
     let room = paper_room(PaperLamps::Three).expect("a legal scene");
-    let polygon = |surface: &relume::scene::Surface| {
-        let mut vertices = [[0.0; 3]; 4];
-        for (to, from) in vertices.iter_mut().zip(surface.polygon().vertices()) {
-            *to = from.to_array();
-        }
-        let reflectance = surface.reflectance().get().to_array();
-        (vertices, reflectance, surface.emission().map(|e| e.light))
-    };
     room.scene.surfaces.iter().map(polygon).collect()
 }
 

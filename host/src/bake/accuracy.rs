@@ -2,7 +2,8 @@
 //!
 //! The error of the mesh falls with the length of the elements, that of the rays with the root of
 //! their number; the two add as squares. Half of the goal is left to the rays; a bake tells how large the error
-//! of its mesh is, and the next one takes the length that brings it to 0.8 of the goal.
+//! of its mesh is, and the next one takes the length that brings it to 0.8 of the goal. Patches that shoot are divided
+//! where direct light varies by more than three goals.
 
 use std::cell::Cell;
 use std::ops::ControlFlow;
@@ -14,7 +15,7 @@ use crate::scene::OwnedScene;
 use crate::solution::Solution;
 
 /// Most bakes for one goal.
-const MOST_BAKES: u32 = 5;
+pub const MOST_BAKES: u32 = 5;
 
 /// Share of the goal that the mesh may use.
 const MESH_SHARE: f32 = 0.8;
@@ -22,11 +23,14 @@ const MESH_SHARE: f32 = 0.8;
 /// Share of the goal that the rays may use.
 const RAY_SHARE: f32 = 0.5;
 
+/// Variation of direct light inside a shooter, in goals: it sends the mean, and receivers blur what they get of that.
+const VARIATION: f32 = 3.0;
+
 /// Elements may be so much shorter than needed.
 const SLACK: f32 = 1.3;
 
 /// Elements above which a bake does not refine its mesh for an error.
-const MOST_ELEMENTS: usize = 400_000;
+pub const MOST_ELEMENTS: usize = 400_000;
 
 /// Bakes until the estimated error of every light is at most `goal`, with elements not much
 /// shorter than that needs; with the last of them where it cannot be reached.
@@ -40,6 +44,7 @@ pub(super) fn bake_to(
     let start = mesh::spacing(&centred.view()?, settings.patch, settings.element);
     let mut settings = Settings {
         noise: goal * RAY_SHARE,
+        variation: settings.variation.min((VARIATION * goal).into()),
         error: None,
         element: Some(start.element),
         ..settings.clone()
@@ -54,11 +59,12 @@ pub(super) fn bake_to(
     let mut bakes = 0;
     loop {
         settings.element = Some(element);
+        let scene = mesh::cut(scene, settings.patch, settings.element)?;
         let Baked {
             solution,
             hits,
             of_mesh,
-        } = Meshed::new(scene, settings.patch, settings.element, &mut watch)?
+        } = Meshed::new(&scene, settings.patch, settings.element, &mut watch)?
             .bake(&settings, &mut watch)?;
         bakes += 1;
         let worst = solution.lights.iter().map(|light| light.error);

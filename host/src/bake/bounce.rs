@@ -94,7 +94,33 @@ pub(super) fn along(
         return Err(BakeError::Interrupted);
     }
     light.bounce(&mesh, hits, job.settings.residual);
-    Ok(light.solved(lamps.rows + passes, mesh, hits, job.settings))
+    Ok(light.solved(most, mesh, hits, job.settings))
+}
+
+/// Relative L1 error of every light that the scatter of the rays leaves, and what has not been distributed.
+pub(super) fn errors(
+    mesh: &OwnedMesh,
+    hits: &Hits,
+    contributions: &[Rgb],
+    residuals: &[f32],
+) -> Vec<f32> {
+    let mut errors = residuals.to_vec();
+    let mut block = vec![[[0.0; LANES]; 3]; mesh.elements.len()];
+    for (number, errors) in errors.chunks_mut(LANES).enumerate() {
+        for (lanes, values) in block.iter_mut().zip(contributions.chunks(residuals.len())) {
+            let values = &values[number * LANES..][..errors.len()];
+            for (lane, value) in values.iter().enumerate() {
+                for (channel, value) in lanes.iter_mut().zip(value.to_array()) {
+                    channel[lane] = value;
+                }
+            }
+        }
+        let noise = hits.noise(&mesh.view(), &block);
+        for (error, noise) in errors.iter_mut().zip(noise) {
+            *error += noise;
+        }
+    }
+    errors
 }
 
 /// Light on the elements.
@@ -202,15 +228,16 @@ impl Light {
         let irradiance: Vec<_> = self.blocks.iter().map(Block::irradiance).collect();
         let direct: Vec<_> = self.blocks.iter().map(|b| b.direct.clone()).collect();
         let residuals = self.blocks.iter().flat_map(|block| block.residuals);
-        let errors = self.blocks.iter().flat_map(|block| block.errors);
+        let residuals: Vec<f32> = residuals.take(self.lights).collect();
+        let contributions = by_element(&irradiance, self.lights);
         Solved {
-            contributions: by_element(&irradiance, self.lights),
+            errors: errors(&mesh, hits, &contributions, &residuals),
+            contributions,
             direct: settings
                 .split_direct
                 .then(|| by_element(&direct, self.lights)),
             exposed: hits.exposed(mesh.elements.len()),
-            residuals: residuals.take(self.lights).collect(),
-            errors: errors.take(self.lights).collect(),
+            residuals,
             rows,
             mesh,
         }

@@ -14,8 +14,8 @@ use crate::rows::RowFiller;
 pub(super) enum DirectSource {
     /// A point, spot, sun or sky.
     Luminaire,
-    /// A whole face.
-    Face,
+    /// A whole face by number.
+    Face(u32),
     /// A patch by number.
     Patch(u32),
 }
@@ -96,7 +96,8 @@ pub(super) fn visit(
         }
         match source {
             DirectSource::Patch(patch) => filler.patch(&view, *patch, &mut row),
-            DirectSource::Luminaire | DirectSource::Face => filler.lamp(&view, polygon, &mut row),
+            DirectSource::Face(face) => filler.lamp(&view, &view.faces[*face as usize], &mut row),
+            DirectSource::Luminaire => continue,
         }
         rows += 1;
         visit(DirectRow {
@@ -119,9 +120,11 @@ pub(super) fn shooters(mesh: &OwnedMesh, lamps: Lamps) -> Vec<(DirectSource, Pol
     match lamps {
         Lamps::Waiting => Vec::new(),
         Lamps::Whole => {
-            let faces = mesh.faces.iter();
+            let faces = mesh.faces.iter().zip(0..);
             faces
-                .filter_map(|face| Some((DirectSource::Face, face.polygon, face.emission?)))
+                .filter_map(|(face, number)| {
+                    Some((DirectSource::Face(number), face.polygon, face.emission?))
+                })
                 .collect()
         }
         Lamps::Patches => (0..mesh.patches.len() as u32)

@@ -10,7 +10,17 @@
 //! The scatter of the rays of the places themselves is none of it; half the difference `n(x)` between its even and
 //! odd rays is as large, so `sqrt(max((E(x) - E_j)^2 - n(x)^2, 0))` takes the place of the difference.
 //!
-//! Assumption: the places see elements whose own errors even out.
+//! What varies inside an element evens out over it, but not where it goes: next to a dark thing, say in the gap behind a
+//! lamp, less of it comes back. With `s(x) = rho_j E(x) - B` the radiosity that a place has more than the `B` that its element or
+//! patch sends, and `w(x) = 1/R sum_r rho_h(r)` the share that comes back of it (its mean is `w`, and `v` that of what all places
+//! send), every light is too dark or too bright by about
+//!
+//! `G = sum a s(x) (w(x) - w) / sum a / (1 - v)`,
+//!
+//! as the ambient term of Cohen et al. (1988, eq. 12) sums all further bounces; `w` is taken off as `s` should add up to nothing, and the
+//! square of the standard error of the sum off its square. `G` and the differences add as squares.
+//!
+//! Assumption: the places see elements whose own errors even out but for that.
 
 use rayon::prelude::*;
 use relume::color::Rgb;
@@ -40,43 +50,123 @@ pub(super) fn errors(
     mesh: &OwnedMesh,
     bvh: &Bvh,
     contributions: &[Rgb],
+    senders: Senders,
 ) -> Vec<f32> {
     let lights = scene.lights() as usize;
     let count = (mesh.elements.len() / ELEMENTS_PER_PLACE).clamp(FEWEST_PLACES, MOST_PLACES);
     let places = spread(&mesh.view(), contributions, count, SEED);
     let direct = direct_light(scene, mesh, bvh, &places);
-    let gathered = gathered_light(mesh, bvh, contributions, lights, &places);
-
-    let (mut errors, mut totals) = (vec![0.0_f64; lights], vec![0.0_f64; lights]);
-    for ((place, direct), gathered) in places
-        .iter()
-        .zip(direct.chunks(lights))
-        .zip(gathered.chunks(lights))
-    {
-        let known = &contributions[place.element * lights..][..lights];
-        for (light, ((direct, gathered), known)) in
-            direct.iter().zip(gathered).zip(known).enumerate()
-        {
-            let [even, odd] = gathered;
-            let better = (*direct + *even + *odd).to_array();
-            let noise = (*even - *odd).to_array();
-            for ((better, noise), known) in better.into_iter().zip(noise).zip(known.to_array()) {
-                let square = (better - known).powi(2) - noise.powi(2);
-                errors[light] += place.area * f64::from(square.max(0.0).sqrt());
-                totals[light] += place.area * f64::from(better);
-            }
+    let (gathered, returned) = gathered_light(mesh, bvh, contributions, lights, &places);
+    let of_patches = match senders {
+        Senders::Elements => None,
+        Senders::Patches => Some(patch_radiosities(mesh, contributions, lights)),
+    };
+    let seen = |light: usize, number: usize| {
+        let Place {
+            element,
+            part,
+            area,
+        } = places[number];
+        let [even, odd] = gathered[number * lights + light];
+        let known = contributions[element * lights + light];
+        let of_element = part.reflectance * known;
+        Seen {
+            area,
+            better: direct[number * lights + light] + even + odd,
+            noise: even - odd,
+            known,
+            reflectance: part.reflectance,
+            sent: of_patches.as_ref().map_or(of_element, |sent| {
+                sent[part.patch as usize * lights + light]
+            }),
+            returned: returned[number],
         }
-    }
-    let shares = errors.into_iter().zip(totals);
-    shares
-        .map(|(error, total)| {
-            if total > 0.0 {
-                (error / total) as f32
-            } else {
-                0.0
-            }
+    };
+    (0..lights)
+        .map(|light| {
+            let seen = (0..places.len()).map(|number| seen(light, number));
+            relative_error(&seen.collect::<Vec<_>>())
         })
         .collect()
+}
+
+/// Who sends light on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Senders {
+    /// Every element what it gets itself.
+    Elements,
+    /// Every patch evenly what its elements get.
+    Patches,
+}
+
+/// A place and one light.
+struct Seen {
+    area: f64,
+    /// Light found there, and half the difference of two halves of it.
+    better: Rgb,
+    noise: Rgb,
+    /// What its element has of it.
+    known: Rgb,
+    reflectance: Rgb,
+    /// Radiosity that stands for that of the place.
+    sent: Rgb,
+    /// What share of the light that the place sends is sent on.
+    returned: Rgb,
+}
+
+/// Over all places and channels.
+fn relative_error(places: &[Seen]) -> f32 {
+    let (mut error, mut total) = (0.0, 0.0);
+    for channel in 0..3 {
+        let of = |value: Rgb| f64::from(value.to_array()[channel]);
+        let level = level_error(places.iter().map(|place| {
+            let more = of(place.reflectance) * of(place.better) - of(place.sent);
+            [place.area, more, of(place.sent), of(place.returned)]
+        }));
+        for place in places {
+            let square = (of(place.better) - of(place.known)).powi(2) - of(place.noise).powi(2);
+            error += place.area * level.hypot(square.max(0.0).sqrt());
+            total += place.area * of(place.better);
+        }
+    }
+    if total > 0.0 {
+        (error / total) as f32
+    } else {
+        0.0
+    }
+}
+
+/// `G`, W/m2, from `a`, `s`, `B` and `w` of all places.
+fn level_error(places: impl Iterator<Item = [f64; 4]> + Clone) -> f64 {
+    let sum = |value: fn([f64; 4]) -> f64| places.clone().map(value).sum::<f64>();
+    let area = sum(|[a, ..]| a);
+    let sent = sum(|[a, _, b, _]| a * b);
+    if area <= 0.0 || sent <= 0.0 {
+        return 0.0;
+    }
+    let mean = sum(|[a, _, _, w]| a * w) / area;
+    let kept = sum(|[a, _, b, w]| a * b * w) / sent;
+    let (mut total, mut squares) = (0.0, 0.0);
+    for [a, s, _, w] in places {
+        let term = a * s * (w - mean);
+        total += term;
+        squares += term * term;
+    }
+    let certain = (total * total - squares).max(0.0).sqrt();
+    certain / area / (1.0 - kept).max(f64::EPSILON)
+}
+
+/// What patches reflect, `[patch][light]`, W/m2.
+fn patch_radiosities(mesh: &OwnedMesh, contributions: &[Rgb], lights: usize) -> Vec<Rgb> {
+    let mut sent = vec![Rgb::BLACK; mesh.patches.len() * lights];
+    for (element, values) in mesh.elements.iter().zip(contributions.chunks(lights)) {
+        let patch = element.patch as usize;
+        let share = element.reflectance * (element.area / mesh.patches[patch].area);
+        for (sent, value) in sent[patch * lights..].iter_mut().zip(values) {
+            *sent += share * *value;
+        }
+    }
+    sent
 }
 
 /// Direct light of places, `[place][light]`.
@@ -115,35 +205,40 @@ fn with_patches_of_their_own(mesh: &OwnedMesh, places: &[Place]) -> OwnedMesh {
     own
 }
 
-/// What the even and the odd rays of places add to their light, `[place][light]`.
+/// What the even and the odd rays of places add to their light, `[place][light]`, and the mean reflectance of what the rays of
+/// each place meet.
 fn gathered_light(
     mesh: &OwnedMesh,
     bvh: &Bvh,
     contributions: &[Rgb],
     lights: usize,
     places: &[Place],
-) -> Vec<[Rgb; 2]> {
+) -> (Vec<[Rgb; 2]>, Vec<Rgb>) {
     let view = mesh.view();
     let locator = Locator::new(view);
     let rays = Rays::new(view, &locator, bvh);
     let fan = Fan::new(RAYS);
     let mut light = vec![[Rgb::BLACK; 2]; places.len() * lights];
-    let of_places = light.par_chunks_mut(lights).zip(places);
-    of_places.enumerate().for_each(|(seed, (light, place))| {
-        let Some(polygon) = view.element_polygon(&place.part) else {
-            return;
-        };
-        let ends = rays.from_point(&polygon, polygon.center(), seed as u64, &fan);
-        for (half, end) in [0, 1].into_iter().cycle().zip(ends) {
-            let Some(element) = end.map(|end| end.element as usize) else {
-                continue;
+    let mut returned = vec![Rgb::BLACK; places.len()];
+    let of_places = light.par_chunks_mut(lights).zip(&mut returned).zip(places);
+    of_places
+        .enumerate()
+        .for_each(|(seed, ((light, returned), place))| {
+            let Some(polygon) = view.element_polygon(&place.part) else {
+                return;
             };
-            let share = mesh.elements[element].reflectance * (RAYS as f32).recip();
-            let sent = &contributions[element * lights..][..lights];
-            for (halves, sent) in light.iter_mut().zip(sent) {
-                halves[half] += share * *sent;
+            let ends = rays.from_point(&polygon, polygon.center(), seed as u64, &fan);
+            for (half, end) in [0, 1].into_iter().cycle().zip(ends) {
+                let Some(element) = end.map(|end| end.element as usize) else {
+                    continue;
+                };
+                let share = mesh.elements[element].reflectance * (RAYS as f32).recip();
+                *returned += share;
+                let sent = &contributions[element * lights..][..lights];
+                for (halves, sent) in light.iter_mut().zip(sent) {
+                    halves[half] += share * *sent;
+                }
             }
-        }
-    });
-    light
+        });
+    (light, returned)
 }

@@ -21,6 +21,7 @@ use relume::scene::{Scene, SceneError};
 use relume::visibility::OccludersAndBodies;
 use thiserror::Error;
 
+use self::estimate::Senders;
 use crate::bvh::Bvh;
 use crate::gather::Hits;
 use crate::mesh::{self, BuildError, Centred, OwnedMesh};
@@ -29,6 +30,7 @@ use crate::scene::OwnedScene;
 use crate::solution::{Solution, SolutionLight};
 
 pub use crate::solution::Method;
+pub use accuracy::{MOST_BAKES, MOST_ELEMENTS};
 pub use memory::Memory;
 pub use update::update;
 
@@ -139,8 +141,8 @@ pub enum BakeError {
     NothingLit,
     /// An update was asked for that only a whole bake can give.
     #[error(
-        "more than its lights has changed since that solution was baked, or it was not baked by \
-         --method gather; bake it again"
+        "more than its lights has changed since that solution was baked, or a lamp with a shape of its own is new, or it was \
+         not baked by --method gather; bake it again"
     )]
     OtherScene,
     /// The watcher broke before there was anything to return.
@@ -200,7 +202,10 @@ pub fn bake_keeping(
     watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<(Solution, Hits), BakeError> {
     match settings.error {
-        None => Meshed::new(scene, settings.patch, settings.element, watch)?.solve(settings, watch),
+        None => {
+            let scene = mesh::cut(scene, settings.patch, settings.element)?;
+            Meshed::new(&scene, settings.patch, settings.element, watch)?.solve(settings, watch)
+        }
         Some(goal) => accuracy::bake_to(scene, settings, goal, watch),
     }
 }
@@ -330,7 +335,12 @@ impl<'a> Meshed<'a> {
             watch,
         };
         let (solved, hits) = solve(&mut job, self.mesh.clone())?;
-        let seen = estimate::errors(job.scene, &solved.mesh, &self.bvh, &solved.contributions);
+        let senders = match settings.method {
+            Method::Gather if !settings.plain => Senders::Elements,
+            _ => Senders::Patches,
+        };
+        let (mesh, found) = (&solved.mesh, &solved.contributions);
+        let seen = estimate::errors(job.scene, mesh, &self.bvh, found, senders);
         let of_mesh = seen.iter().zip(&solved.errors);
         let of_mesh = of_mesh.map(|(seen, left)| (seen * seen - left * left).max(0.0).sqrt());
         Ok(Baked {

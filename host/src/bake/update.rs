@@ -10,7 +10,8 @@ use relume::color::Rgb;
 use relume::mesh::Side;
 use relume::scene::{Luminaire, Source, Surface};
 
-use super::{BakeError, Job, Progress, Settings, bounce, estimate, solution};
+use super::estimate::Senders;
+use super::{BakeError, Job, Progress, Settings, Solved, bounce, estimate, solution};
 use crate::bvh::Bvh;
 use crate::gather::Hits;
 use crate::mesh::{self, OwnedMesh};
@@ -38,6 +39,8 @@ pub fn update(
     settings: &Settings,
     watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<(Solution, usize), BakeError> {
+    let (patch, element) = (old.spacing.patch, old.spacing.element);
+    let scene = &*mesh::cut(scene, Some(patch), Some(element))?;
     let centred = mesh::centred(scene);
     let view = centred.view()?;
     let mut mesh = mesh::placed(&old.mesh, view.surfaces());
@@ -73,10 +76,18 @@ pub fn update(
         watch,
     };
     let is_changed = |light: u32| kept[light as usize].is_none();
-    let solved = bounce::along(&mut job, mesh, &bvh, hits, is_changed)?;
-    let seen = estimate::errors(&view, &solved.mesh, &bvh, &solved.contributions);
-    let mut new = solution(scene, Method::Gather, old.spacing, solved, &seen);
-    take_over(&mut new, old, &kept);
+    let mut solved = bounce::along(&mut job, mesh, &bvh, hits, is_changed)?;
+    take_over(&mut solved, old, &kept);
+    let (found, residuals) = (&solved.contributions, &solved.residuals);
+    solved.errors = bounce::errors(&solved.mesh, hits, found, residuals);
+    let seen = estimate::errors(
+        &view,
+        &solved.mesh,
+        &bvh,
+        &solved.contributions,
+        Senders::Elements,
+    );
+    let new = solution(scene, Method::Gather, old.spacing, solved, &seen);
     let changed = kept.iter().filter(|kept| kept.is_none()).count();
     Ok((new, changed))
 }
@@ -117,13 +128,12 @@ fn emitters(luminaires: &[Luminaire], mesh: &OwnedMesh, tag: u32) -> Emitters {
     }
 }
 
-/// Takes over what the old solution says of the lights that were kept.
-fn take_over(new: &mut Solution, old: &Solution, kept: &[Option<usize>]) {
-    let (count, old_count) = (new.lights.len(), old.lights.len());
+/// Takes over what the old solution has of the lights that were kept.
+fn take_over(new: &mut Solved, old: &Solution, kept: &[Option<usize>]) {
+    let (count, old_count) = (kept.len(), old.lights.len());
     for (tag, old_tag) in kept.iter().enumerate() {
         let Some(old_tag) = old_tag else { continue };
-        new.lights[tag].residual = old.lights[*old_tag].residual;
-        new.lights[tag].error = old.lights[*old_tag].error;
+        new.residuals[tag] = old.lights[*old_tag].residual;
         let copy = |to: &mut [Rgb], from: &[Rgb]| {
             let from = from.iter().skip(*old_tag).step_by(old_count);
             for (to, from) in to.iter_mut().skip(tag).step_by(count).zip(from) {

@@ -43,6 +43,7 @@ pub struct Bvh {
     facets: Facets,
     /// Surfaces on top of others.
     stacks: Stacks,
+    margin: f32,
 }
 
 impl std::fmt::Debug for Bvh {
@@ -141,20 +142,30 @@ impl Bvh {
             bodies,
             tree,
             facets: Facets::new(surfaces, farthest),
+            margin: surfaces
+                .iter()
+                .map(|surface| surface.polygon().plane().tolerance(farthest))
+                .fold(0.0, f32::max),
         }
+    }
+
+    /// By how much surfaces have grown at most for [`Caster`]s, which closes cracks between them, in m.
+    #[must_use]
+    pub const fn margin(&self) -> f32 {
+        self.margin
     }
 
     /// Casts rays for their nearest surfaces. A surface on which a ray starts is met or not as
     /// rounding has it, so rays should start at [`lifted`] points.
     #[must_use]
     pub const fn caster(&self) -> Caster<'_> {
-        Caster::new(&self.facets)
+        Caster::new(&self.facets, &self.stacks)
     }
 
     /// The same from one [`lifted`] point.
     #[must_use]
     pub fn caster_from(&self, point: Vec3) -> PointCaster<'_> {
-        PointCaster::new(&self.facets, point)
+        PointCaster::new(&self.facets, &self.stacks, point)
     }
 
     fn crossing(&self, index: usize, from: Vec3, to: Vec3) -> Option<f32> {
@@ -196,6 +207,24 @@ impl Bvh {
         });
         found.sort_unstable_by_key(|(surface, _)| *surface);
         found
+    }
+
+    /// Numbers of the surfaces whose boxes come within a distance of a polygon's, in order.
+    pub(crate) fn near(&self, polygon: &Polygon, distance: f32) -> Vec<u32> {
+        let mut bounds = Aabb::empty();
+        for vertex in polygon.vertices() {
+            bounds.extend(Vec3A::from(*vertex));
+        }
+        let margin = Vec3A::splat(distance);
+        let bounds = Aabb::new(bounds.min - margin, bounds.max + margin);
+        let mut near = Vec::new();
+        visit_leaves(
+            &self.tree,
+            |node| !node.intersect_aabb(&bounds),
+            |leaf| near.extend_from_slice(&self.surfaces[leaf]),
+        );
+        near.sort_unstable();
+        near
     }
 
     /// What stands between two regions, looked up once for many pairs of points in them.

@@ -16,6 +16,7 @@ use obvhs::bvh2::builder::build_bvh2;
 use relume::scene::Surface;
 
 use super::facet::{Block, Facet, LANES, Met, Ray, Start};
+use super::stacks::Stacks;
 use super::{Bounded, Hit};
 
 /// Most blocks that are asked one after the other: 32 facets.
@@ -32,6 +33,7 @@ pub(super) struct Facets {
 /// Casts rays one after the other.
 pub struct Caster<'a> {
     facets: &'a Facets,
+    stacks: &'a Stacks,
     /// What is left to look at, and how far away it is.
     waiting: Vec<(f32, Child)>,
     /// The block that last stood between two points: it often stands between the next two as well.
@@ -39,18 +41,20 @@ pub struct Caster<'a> {
 }
 
 impl<'a> Caster<'a> {
-    pub(super) const fn new(facets: &'a Facets) -> Self {
+    pub(super) const fn new(facets: &'a Facets, stacks: &'a Stacks) -> Self {
         Self {
             facets,
+            stacks,
             waiting: Vec::new(),
             blocker: 0,
         }
     }
 
-    /// The surface that a ray meets first.
+    /// The surface that a ray meets first; of several in one plane the one on top.
     #[must_use]
     pub fn nearest(&mut self, from: Vec3, direction: Vec3) -> Option<Hit> {
-        self.facets.nearest(from, direction, &mut self.waiting)
+        let hit = self.facets.nearest(from, direction, &mut self.waiting)?;
+        Some(self.stacks.top(hit, from, direction))
     }
 
     /// True when nothing lies between two points that are [`lifted`] off their surfaces. All others have
@@ -85,7 +89,7 @@ pub struct PointCaster<'a> {
 }
 
 impl<'a> PointCaster<'a> {
-    pub(super) fn new(facets: &'a Facets, from: Vec3) -> Self {
+    pub(super) fn new(facets: &'a Facets, stacks: &'a Stacks, from: Vec3) -> Self {
         let blocks = facets.blocks.iter();
         let starts = if facets.nodes.is_empty() {
             blocks.map(|block| block.start(from)).collect()
@@ -93,24 +97,29 @@ impl<'a> PointCaster<'a> {
             Vec::new()
         };
         Self {
-            caster: Caster::new(facets),
+            caster: Caster::new(facets, stacks),
             from,
             starts,
         }
     }
 
-    /// The surface that a ray meets first.
+    /// Casts rays from elsewhere.
+    pub const fn caster(&mut self) -> &mut Caster<'a> {
+        &mut self.caster
+    }
+
+    /// The surface that a ray meets first; of several in one plane the one on top.
     #[must_use]
     pub fn nearest(&mut self, direction: Vec3) -> Option<Hit> {
         if self.starts.is_empty() {
             return self.caster.nearest(self.from, direction);
         }
         let mut met = Met::nothing(f32::INFINITY);
-        let direction = direction.to_array().map(Vec4::splat);
+        let along = direction.to_array().map(Vec4::splat);
         for (block, start) in self.caster.facets.blocks.iter().zip(&self.starts) {
-            block.meet_from(start, direction, &mut met);
+            block.meet_from(start, along, &mut met);
         }
-        met.hit()
+        Some(self.caster.stacks.top(met.hit()?, self.from, direction))
     }
 }
 

@@ -7,17 +7,19 @@ use relume::geometry::Polygon;
 use relume::scene::Surface;
 use relume::visibility::covers;
 
-use super::{Bounded, visit_leaves};
+use super::{Bounded, Hit, visit_leaves};
 
 /// One surface on top of another one.
 struct Stack {
     bottom: u32,
     /// The side from which it is.
     facing: Vec3,
-    top: Polygon,
+    top: u32,
+    outline: Polygon,
 }
 
 /// All of them, by the number of the one below.
+#[derive(Default)]
 pub(super) struct Stacks(Vec<Stack>);
 
 impl Stacks {
@@ -37,10 +39,11 @@ impl Stacks {
             for facing in [normal, -normal] {
                 let tops = near.iter().map(|top| (*top, &surfaces[*top as usize]));
                 let tops = tops.filter(|top| covers(*top, (number, bottom), facing));
-                stacks.extend(tops.map(|(_, top)| Stack {
+                stacks.extend(tops.map(|(top, surface)| Stack {
                     bottom: number,
                     facing,
-                    top: *top.polygon(),
+                    top,
+                    outline: *surface.polygon(),
                 }));
             }
         }
@@ -49,10 +52,29 @@ impl Stacks {
 
     /// What lies on a surface, seen from a side.
     pub(super) fn above(&self, surface: u32, facing: Vec3) -> impl Iterator<Item = &Polygon> {
+        self.on(surface, facing).map(|stack| &stack.outline)
+    }
+
+    /// What a ray sees where it met a surface: the one on top there.
+    pub(super) fn top(&self, mut hit: Hit, from: Vec3, direction: Vec3) -> Hit {
+        if self.0.is_empty() {
+            return hit;
+        }
+        let place = from + direction * hit.distance;
+        while let Some(stack) = self
+            .on(hit.surface, -direction)
+            .find(|stack| stack.outline.holds(place))
+        {
+            hit.surface = stack.top;
+            hit.front = stack.outline.normal().dot(direction) < 0.0;
+        }
+        hit
+    }
+
+    fn on(&self, surface: u32, facing: Vec3) -> impl Iterator<Item = &Stack> {
         let first = self.0.partition_point(|stack| stack.bottom < surface);
         let own = self.0[first..].iter();
         own.take_while(move |stack| stack.bottom == surface)
             .filter(move |stack| stack.facing.dot(facing) > 0.0)
-            .map(|stack| &stack.top)
     }
 }

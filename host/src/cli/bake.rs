@@ -12,7 +12,9 @@ use relume::color::Rgb;
 use serde_json::json;
 
 use super::{Outcome, human_bytes, keep, output_path, spare, tell, write_file, wrong_usage};
-use crate::bake::{BakeError, Method, Progress, Settings, bake_keeping, update};
+use crate::bake::{
+    BakeError, MOST_BAKES, MOST_ELEMENTS, Method, Progress, Settings, bake_keeping, update,
+};
 use crate::gather::{self, Hits};
 use crate::import;
 use crate::scene::OwnedScene;
@@ -20,6 +22,9 @@ use crate::solution::{self, Solution};
 
 /// Most names in a line for people; `--json` has them all.
 const MOST_NAMES: usize = 8;
+
+/// Display codes in a relative error of one: `255 * 1.055 / 2.4` in the bright, less in the dark (the slope of sRGB's curve).
+const CODES_PER_ERROR: f32 = 112.0;
 
 /// Rounding of coordinates, in diagonals of the scene, that is told: details of a hundredth are a
 /// hundredth off.
@@ -224,6 +229,8 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
             "shots": solution.rows,
             "residual": baked.residual(),
             "error": baked.error(),
+            "wanted_error": arguments.error,
+            "met": arguments.error.map(|goal| baked.error() <= goal),
             "method": arguments.settings().method.name(),
             "seconds": baked.time.as_secs_f64(),
             "interrupted": baked.interrupted,
@@ -382,16 +389,27 @@ fn report_choice(baked: &Baked, goal: f32) {
         .max_by(|a, b| a.error.total_cmp(&b.error));
     let name = worst.map_or("", |light| &light.name);
     let verdict = if baked.error() <= goal {
-        "met"
+        "met".to_owned()
     } else {
-        "NOT met: ask for shorter elements (--element)"
+        let scatter = match solution.method {
+            Method::Gather => ", whose rays scatter; --method rows has none",
+            Method::Rows | Method::Device => "",
+        };
+        format!(
+            "NOT met by {MOST_BAKES} bakes, or {MOST_ELEMENTS} elements, or the most rays of each{scatter}"
+        )
+    };
+    let work = match solution.method {
+        Method::Gather => "rows and passes of 16 rays for the scatter",
+        Method::Rows | Method::Device => "rows, of patches divided where direct light varies",
     };
     tell!(
-        "error {:.2} % wanted, {:.2} % estimated for the worst light ({name}): {verdict}; elements of \
-         {:.3} for the variation inside them, {} rows and passes of 16 rays for the scatter",
+        "error {:.2} % wanted, {:.2} % estimated for the worst light ({name}): {verdict}; elements of {:.3} for the \
+         variation inside them, {} {work}; `relume pack --max-error {:.1}` adds at most half as much",
         100.0 * goal,
         100.0 * baked.error(),
         solution.spacing.element,
         solution.rows,
+        goal / 2.0 * CODES_PER_ERROR,
     );
 }

@@ -26,7 +26,7 @@ use relume::refine::Lanes;
 use relume::refine::krylov::{self, Work};
 use relume::scene::{Scene, Surface};
 
-use crate::bvh::{Bvh, Hit, lifted};
+use crate::bvh::{Bvh, Caster, Hit, lifted};
 use crate::mesh::Locator;
 use crate::noise;
 
@@ -40,6 +40,13 @@ const DARK: u32 = u32::MAX - 1;
 
 /// Least share of an element that counts as reached by light: direct light is sampled at four points.
 const LEAST_EXPOSED: f32 = 0.25;
+
+/// How far before its end a ray is asked whether it can have come there, in widths of the margin
+/// that closes cracks between facets.
+const BEFORE: f32 = 4.0;
+
+/// By how much what a ray met is drawn towards its middle then.
+const INWARDS: f32 = 1e-3;
 
 /// `1/g` with `g^2 = g + 1`, in parts of 2^32.
 const GOLDEN_STEP: u32 = 2_654_435_769;
@@ -171,7 +178,8 @@ impl<'a> Rays<'a> {
         let mut caster = self.bvh.caster_from(from);
         fan.0.iter().map(move |step| {
             let direction = frame.direction(step.across(0, first));
-            self.end(caster.nearest(direction)?, from, direction)
+            let hit = caster.nearest(direction)?;
+            self.end(caster.caster(), hit, from, direction)
         })
     }
 
@@ -182,8 +190,9 @@ impl<'a> Rays<'a> {
         let across = Vec2::from_angle(TAU * turn) * share.sqrt();
         let direction = Frame::new(polygon).direction(across);
         let from = lifted(polygon, point);
-        let hit = self.bvh.caster().nearest(from, direction)?;
-        self.end(hit, from, direction)
+        let mut caster = self.bvh.caster();
+        let hit = caster.nearest(from, direction)?;
+        self.end(&mut caster, hit, from, direction)
     }
 
     /// Casts a ray for every step from an element, and notes where each ends.
@@ -201,7 +210,7 @@ impl<'a> Rays<'a> {
                 None => NOTHING,
                 Some(met) if dark.contains(met.surface, met.side()) => DARK,
                 Some(met) => {
-                    let end = self.end(met, from, direction);
+                    let end = self.end(&mut caster, met, from, direction);
                     end.map_or(NOTHING, |end| end.element)
                 }
             };
@@ -209,8 +218,17 @@ impl<'a> Rays<'a> {
     }
 
     /// The element that a ray met; `None` where it is absorbed.
-    fn end(&self, hit: Hit, from: Vec3, direction: Vec3) -> Option<End> {
+    fn end(&self, caster: &mut Caster, hit: Hit, from: Vec3, direction: Vec3) -> Option<End> {
         let position = from + direction * hit.distance;
+        let outline = &self.locator.face(hit.surface, hit.side())?.polygon;
+        if !outline.holds(position) {
+            // Facets have grown, so over an edge one of them shows its other side to rays outside.
+            let before = (hit.distance - BEFORE * self.bvh.margin()).max(0.0);
+            let inside = position + (outline.center() - position) * INWARDS;
+            if !caster.sees(from + direction * before, lifted(outline, inside)) {
+                return None;
+            }
+        }
         let element = self.locator.element(hit.surface, hit.side(), position)?;
         Some(End {
             element,

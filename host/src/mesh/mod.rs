@@ -3,6 +3,8 @@
 mod centre;
 mod locate;
 mod reach;
+
+mod cut;
 mod split;
 mod spread;
 
@@ -19,6 +21,7 @@ use crate::bvh::Bvh;
 use crate::scene::OwnedScene;
 
 pub use centre::{Centred, centred, placed};
+pub use cut::cut;
 pub use locate::Locator;
 pub use split::{Direct, Split, split};
 pub use spread::{Place, spread};

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use relume::form_factor::Shooter;
 use relume::geometry::{Polygon, from_unit_square, gauss_points};
 use relume::luminaire;
-use relume::mesh::{Face, Mesh, Side, Spacing, is_face, subdivide};
+use relume::mesh::{Face, Mesh, MeshError, Side, Spacing, is_face, subdivide};
 use relume::scene::{Scene, Source};
 
 use super::{BuildError, OwnedMesh};
@@ -88,13 +88,7 @@ pub fn reached_faces(
     bvh: &Bvh,
     watch: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Result<ReachedFaces, BuildError> {
-    let mut parts = OwnedMesh::default();
-    let length = spacing.patch.max(super::spacing(scene, None, None).patch);
-    let coarse = Spacing {
-        patch: length,
-        element: length,
-    };
-    subdivide(scene, coarse, |_, _| true, &mut parts)?;
+    let parts = coarse_parts(scene, spacing)?;
     let mesh = parts.view();
     let surroundings = Surroundings::new(&mesh, scene, bvh);
 
@@ -128,13 +122,25 @@ pub fn reached_faces(
     Ok(ReachedFaces(sides))
 }
 
+/// Every side of every surface in parts as large as a patch, or the default patch where that is larger.
+fn coarse_parts(scene: &Scene, spacing: Spacing) -> Result<OwnedMesh, MeshError> {
+    let length = spacing.patch.max(super::spacing(scene, None, None).patch);
+    let coarse = Spacing {
+        patch: length,
+        element: length,
+    };
+    let mut parts = OwnedMesh::default();
+    subdivide(scene, coarse, |_, _| true, &mut parts)?;
+    Ok(parts)
+}
+
 /// Sine of the angle to a surface below which nothing is exchanged: the two sides of one plane do not
 /// see each other, whatever rounding says.
 const GRAZING: f32 = 1e-3;
 
 /// A point on a side of a surface.
 #[derive(Clone, Copy)]
-struct Place {
+pub(super) struct Place {
     position: Vec3,
     normal: Vec3,
     /// Where rays start.
@@ -143,7 +149,7 @@ struct Place {
 
 impl Place {
     /// A point on the front of a polygon.
-    fn new(polygon: &Polygon, position: Vec3) -> Self {
+    pub(super) fn new(polygon: &Polygon, position: Vec3) -> Self {
         Self {
             position,
             normal: polygon.normal(),
@@ -153,7 +159,7 @@ impl Place {
 }
 
 /// A scene as a walker sees it.
-struct Surroundings<'a> {
+pub(super) struct Surroundings<'a> {
     scene: &'a Scene<'a>,
     bvh: &'a Bvh,
     lamps: Vec<Polygon>,
@@ -163,6 +169,16 @@ struct Surroundings<'a> {
 }
 
 impl<'a> Surroundings<'a> {
+    /// A scene that is to be divided into these lengths.
+    pub(super) fn of(
+        scene: &'a Scene<'a>,
+        spacing: Spacing,
+        bvh: &'a Bvh,
+    ) -> Result<Self, MeshError> {
+        let parts = coarse_parts(scene, spacing)?;
+        Ok(Self::new(&parts.view(), scene, bvh))
+    }
+
     fn new(mesh: &Mesh, scene: &'a Scene<'a>, bvh: &'a Bvh) -> Self {
         let emits = |part: &u32| mesh.patch_emission(*part).is_some();
         let lamps: Vec<Polygon> = (0..mesh.patches.len() as u32)
@@ -237,23 +253,27 @@ impl<'a> Surroundings<'a> {
     fn walks_lead_to_light(&self, polygon: &Polygon, part: u32) -> bool {
         let points = gauss_points(polygon);
         let mut caster = self.bvh.caster();
-        let leads_to_light = |walk: &u64| {
-            let seed = (u64::from(part) * WALKS + walk) * LONGEST_WALK;
-            let mut place = Place::new(polygon, points[*walk as usize % points.len()].position);
-            for step in 0..LONGEST_WALK {
-                let seed = (seed + step) * (2 + 4 * GLANCES);
-                if self.is_lit(&mut caster, place, seed + 2) {
-                    return true;
-                }
-                match self.next(&mut caster, place, seed) {
-                    None => return false,
-                    Some(next) => place = next,
-                }
-            }
-            false
-        };
-        let witnesses = (0..WALKS).filter(leads_to_light);
+        let witnesses = (0..WALKS).filter(|walk| {
+            let start = Place::new(polygon, points[*walk as usize % points.len()].position);
+            self.leads_to_light(&mut caster, start, u64::from(part) * WALKS + walk)
+        });
         witnesses.take(WITNESSES).count() == WITNESSES
+    }
+
+    /// True when a walk from a place comes to light.
+    pub(super) fn leads_to_light(&self, caster: &mut Caster, start: Place, walk: u64) -> bool {
+        let mut place = start;
+        for step in 0..LONGEST_WALK {
+            let seed = (walk * LONGEST_WALK + step) * (2 + 4 * GLANCES);
+            if self.is_lit(caster, place, seed + 2) {
+                return true;
+            }
+            match self.next(caster, place, seed) {
+                None => return false,
+                Some(next) => place = next,
+            }
+        }
+        false
     }
 
     /// Where a cosine-weighted ray ends; `None` when it escapes or is absorbed.

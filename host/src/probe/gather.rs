@@ -17,6 +17,7 @@ use std::fmt;
 
 use glam::Vec3;
 use relume::color::Rgb;
+use relume::form_factor::Shooter;
 use relume::luminaire;
 use relume::mesh::{Element, Side};
 use relume::scene::Surface;
@@ -106,10 +107,10 @@ impl<'a> Gatherer<'a> {
             grounds: grounds(solution),
             short: (rays as f32 / RAYS_PER_SQUARE_EDGE).sqrt(),
             patches: Vec::new(),
-            bvh,
             lamps: faces
-                .filter_map(|face| Some(Lamp::new(face.polygon, face.emission?)))
+                .filter_map(|face| Some(Lamp::new(Shooter::of_face(face, &bvh), face.emission?)))
                 .collect(),
+            bvh,
             far,
         }
     }
@@ -118,7 +119,7 @@ impl<'a> Gatherer<'a> {
     /// most of the light comes through small openings.
     #[must_use]
     pub fn with_exact_far_patches(mut self) -> Self {
-        self.patches = radiant_patches(self.solution);
+        self.patches = radiant_patches(self.solution, &self.bvh);
         self
     }
 

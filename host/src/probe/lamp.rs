@@ -49,9 +49,10 @@ pub(super) struct Lamp {
 }
 
 impl Lamp {
-    pub fn new(polygon: Polygon, emission: Emission) -> Self {
+    pub fn new(shooter: Shooter, emission: Emission) -> Self {
+        let polygon = *shooter.polygon();
         Self {
-            shooter: Shooter::new(polygon),
+            shooter,
             emission,
             lift: lift(&polygon),
             center: polygon.center(),
@@ -79,7 +80,8 @@ impl Lamp {
             let square = ray.length_squared();
             let (here, there) = (ray.dot(normal), -ray.dot(polygon.normal()));
             let factor = here * there * density / (PI * square * square);
-            return (here > 0.0 && there > 0.0).then_some((factor, point + self.lift));
+            let is_seen = here > 0.0 && there > 0.0 && !self.shooter.is_covered(point);
+            return is_seen.then_some((factor, point + self.lift));
         }
         let factor = self.shooter.open_at_point(position, normal);
         if factor <= 0.0 {
@@ -90,7 +92,8 @@ impl Lamp {
             point([at[0].wrapping_add(shift[0]), at[1].wrapping_add(shift[1])]).0
         });
         let is_above = |point: &Vec3| (*point - position).dot(normal) > 0.0;
-        Some((factor, points.into_iter().find(is_above)? + self.lift))
+        let point = points.into_iter().find(is_above)?;
+        (!self.shooter.is_covered(point)).then_some((factor, point + self.lift))
     }
 }
 
@@ -111,7 +114,7 @@ fn visible_factor(lamp: &Shooter, spot: Spot, bvh: &Bvh, depth: u32) -> f32 {
         None if depth == MOST_QUARTERINGS => lamp.at_point(position, normal, bvh),
         None => quarters(lamp.polygon())
             .into_iter()
-            .map(|quarter| visible_factor(&Shooter::new(quarter), spot, bvh, depth + 1))
+            .map(|quarter| visible_factor(&lamp.part(quarter), spot, bvh, depth + 1))
             .sum(),
     }
 }

@@ -4,6 +4,7 @@ use glam::Vec3;
 use relume::color::Rgb;
 use relume::form_factor::Shooter;
 
+use crate::bvh::Bvh;
 use crate::solution::Solution;
 
 /// Patches that are farther than so many of their longest edges count as constant.
@@ -26,7 +27,7 @@ impl RadiantPatch {
 }
 
 /// All patches by number.
-pub(super) fn radiant_patches(solution: &Solution) -> Vec<RadiantPatch> {
+pub(super) fn radiant_patches(solution: &Solution, bvh: &Bvh) -> Vec<RadiantPatch> {
     let mesh = solution.mesh.view();
     let mut radiosities = vec![vec![Rgb::BLACK; solution.lights.len()]; mesh.patches.len()];
     let mut areas = vec![0.0; mesh.patches.len()];
@@ -41,9 +42,10 @@ pub(super) fn radiant_patches(solution: &Solution) -> Vec<RadiantPatch> {
         }
     }
     let patches = (0..).zip(radiosities).filter_map(|(patch, radiosity)| {
-        let polygon = mesh.patch_polygon(patch)?;
+        let shooter = Shooter::of_patch(&mesh, patch, bvh)?;
+        let polygon = *shooter.polygon();
         Some(RadiantPatch {
-            shooter: Shooter::new(polygon),
+            shooter,
             center: polygon.center(),
             far: (FAR * polygon.longest_edge()).powi(2),
             radiosity,

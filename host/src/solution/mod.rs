@@ -42,7 +42,8 @@ impl Method {
         match self {
             Self::Gather => {
                 "lamps by exact form factors, by quarters of them where more than 32 polygons stand between; bounces by \
-                 cosine rays of every element, which at equal error took the least time at every size (`relume study accuracy`)"
+                 cosine rays of every element: their work grows with the elements alone, and at equal error among a thousand elements they \
+                 took less time than rows (`relume study accuracy`)"
             }
             Self::Rows | Self::Device => {
                 "lamps and patches by exact form factors, by 16 rays where more than 32 polygons stand between"

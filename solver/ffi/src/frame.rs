@@ -121,9 +121,9 @@ pub(crate) struct Frame {
 /// Sums and the table of one light, in the form of the atlas.
 #[derive(Debug)]
 enum Kept {
-    Lum(&'static mut <Lum as Form>::Table<1>, &'static mut [u32]),
+    Lum(&'static mut <Lum as Form>::Table, &'static mut [u32]),
     Colour(
-        &'static mut <Colour as Form>::Table<1>,
+        &'static mut <Colour as Form>::Table,
         &'static mut [[u16; 3]],
     ),
 }
@@ -141,11 +141,8 @@ impl Layout {
         let is_lum = atlas.lights().all(|light| light.code == Code::Lum8);
         let is_colour = atlas.lights().all(|light| light.code.bytes() == 3);
         let (table, sum) = match (is_lum, is_colour) {
-            (true, _) => (size_of::<<Lum as Form>::Table<1>>(), size_of::<u32>()),
-            (_, true) => (
-                size_of::<<Colour as Form>::Table<1>>(),
-                size_of::<[u16; 3]>(),
-            ),
+            (true, _) => (size_of::<<Lum as Form>::Table>(), size_of::<u32>()),
+            (_, true) => (size_of::<<Colour as Form>::Table>(), size_of::<[u16; 3]>()),
             _ => return None,
         };
         let bytes = |count: u32, size: usize| usize::try_from(count).ok()?.checked_mul(size);

@@ -36,7 +36,8 @@ mod write;
 
 use core::fmt;
 
-use crc::{CRC_32_ISO_HDLC, Crc};
+use crate::code::Known;
+use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use glam::Vec2;
 
 pub use read::{Atlas, AtlasMesh};
@@ -206,12 +207,22 @@ impl fmt::Display for AtlasError {
 impl core::error::Error for AtlasError {}
 
 /// CRC-32 of everything but the checksum itself.
-fn checksum(bytes: &[u8]) -> Option<u32> {
+fn checksum<K: Known>(bytes: &[u8]) -> Option<u32> {
     const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
-    let mut digest = CRC.digest();
-    digest.update(bytes.get(..CHECKSUM_AT)?);
-    digest.update(bytes.get(CHECKSUM_AT + 4..)?);
-    Some(digest.finalize())
+    const SMALL: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+    let (before, after) = (bytes.get(..CHECKSUM_AT)?, bytes.get(CHECKSUM_AT + 4..)?);
+    // A device that knows few codes has no room for the table of 1 KB.
+    if K::ONLY_EXPONENTIAL {
+        let mut digest = SMALL.digest();
+        digest.update(before);
+        digest.update(after);
+        Some(digest.finalize())
+    } else {
+        let mut digest = CRC.digest();
+        digest.update(before);
+        digest.update(after);
+        Some(digest.finalize())
+    }
 }
 
 /// Where the parts lie.

@@ -8,7 +8,9 @@ use super::{
     CountsOf, ELEMENT_BYTES, FACE_BYTES, HEADER_BYTES, LARGEST_TILE_CODE, LIGHT_BYTES, MAGIC,
     NO_LIGHT, NOT_MEASURED, Quantity, SURFACE_BYTES, VERSION, WorstError, checksum,
 };
-use crate::code::{Code, Curve, LARGEST_PART_FIRST, LARGEST_PART_UNIT, Scale};
+use crate::code::{
+    AllCodes, Code, Curve, ExponentialCodes, Known, LARGEST_PART_FIRST, LARGEST_PART_UNIT, Scale,
+};
 use crate::color::{Reflectance, Rgb};
 use crate::geometry::Polygon;
 use crate::mesh::Side;
@@ -36,7 +38,7 @@ impl<'a> Atlas<'a> {
     /// # Errors
     /// [`AtlasError`]: what is wrong with the bytes.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, AtlasError> {
-        let (atlas, mesh) = Self::parse_parts(bytes)?;
+        let (atlas, mesh) = Self::parse_parts::<AllCodes>(bytes)?;
         if let Some(mesh) = mesh {
             mesh.check(atlas.counts.lights)?;
         }
@@ -48,11 +50,21 @@ impl<'a> Atlas<'a> {
     /// # Errors
     /// [`AtlasError`]: what is wrong with the bytes before the mesh, or with all of them by their checksum.
     pub fn parse_codes(bytes: &'a [u8]) -> Result<Self, AtlasError> {
-        Ok(Self::parse_parts(bytes)?.0)
+        Ok(Self::parse_parts::<AllCodes>(bytes)?.0)
+    }
+
+    /// The same for an atlas in exponential codes only, by a reader that knows no others
+    /// and leaves the names unread: they are empty.
+    ///
+    /// # Errors
+    /// [`AtlasError`], as above, and for lights in other codes.
+    #[inline(never)]
+    pub fn parse_exponential(bytes: &'a [u8]) -> Result<Self, AtlasError> {
+        Ok(Self::parse_parts::<ExponentialCodes>(bytes)?.0)
     }
 
     /// The atlas without its mesh, and the mesh, not checked yet.
-    fn parse_parts(bytes: &'a [u8]) -> Result<(Self, Option<AtlasMesh<'a>>), AtlasError> {
+    fn parse_parts<K: Known>(bytes: &'a [u8]) -> Result<(Self, Option<AtlasMesh<'a>>), AtlasError> {
         let header = Header::parse(bytes)?;
         let counts = header.counts;
         // Else any number of elements would fit into a file of no size.
@@ -66,7 +78,8 @@ impl<'a> Atlas<'a> {
         let lights = bytes.get(HEADER_BYTES..lights as usize).unwrap_or_default();
         let (mut stride, mut is_tiled) = (0, false);
         for tag in 0..counts.lights {
-            let code = code_at(lights, tag).ok_or(AtlasError::Illegal("code"))?;
+            let code = code_at(lights, tag).filter(|code| K::knows(*code));
+            let code = code.ok_or(AtlasError::Illegal("code"))?;
             stride += code.bytes();
             is_tiled |= code.is_tiled();
         }
@@ -82,12 +95,17 @@ impl<'a> Atlas<'a> {
         if bytes.len() as u64 > needed.end {
             return Err(AtlasError::Oversized { needed: needed.end });
         }
-        if checksum(bytes) != Some(header.checksum) {
+        if checksum::<K>(bytes) != Some(header.checksum) {
             return Err(AtlasError::Checksum);
         }
 
         let part = |from: u64, to: u64| bytes.get(from as usize..to as usize).unwrap_or_default();
-        let names = core::str::from_utf8(part(needed.names, needed.codes));
+        let names = part(needed.names, needed.codes);
+        let names = if K::ONLY_EXPONENTIAL {
+            Ok("")
+        } else {
+            core::str::from_utf8(names)
+        };
         let tiles = part(needed.tiles, needed.surfaces);
         let is_image = header.image_width > 0;
         if is_image
@@ -98,7 +116,8 @@ impl<'a> Atlas<'a> {
         if tiles.is_empty() == is_tiled {
             return Err(AtlasError::Illegal("table of tiles"));
         }
-        let tiles = is_tiled.then(|| Tiles::parse(tiles, counts.elements));
+        let tiles =
+            (!K::ONLY_EXPONENTIAL && is_tiled).then(|| Tiles::parse(tiles, counts.elements));
         let atlas = Self {
             quantity: header.quantity,
             image_width: header.image_width,
@@ -111,8 +130,8 @@ impl<'a> Atlas<'a> {
             tiles: tiles.transpose()?,
             mesh: None,
         };
-        atlas.check_lights()?;
-        let mesh = (counts.faces > 0).then(|| AtlasMesh {
+        atlas.check_lights::<K>()?;
+        let mesh = (!K::ONLY_EXPONENTIAL && counts.faces > 0).then(|| AtlasMesh {
             surfaces: part(needed.surfaces, needed.faces),
             faces: part(needed.faces, needed.elements),
             elements: part(needed.elements, needed.end),
@@ -120,21 +139,26 @@ impl<'a> Atlas<'a> {
         Ok((atlas, mesh))
     }
 
-    fn check_lights(&self) -> Result<(), AtlasError> {
+    fn check_lights<K: Known>(&self) -> Result<(), AtlasError> {
         let mut named = 0_usize;
         for tag in 0..self.counts.lights {
             let record = LightRecord::parse(record(self.lights, tag, LIGHT_BYTES));
+            let reaches = |record: &LightRecord| {
+                let mut curves = record.curves.iter().zip(record.last);
+                curves.all(|(curve, last)| curve.reaches::<K>(last))
+            };
+            let record = record.filter(reaches);
             let record = record.ok_or(AtlasError::Illegal("light"))?;
             if record.error.is_some() != self.worst_error.is_some() {
                 return Err(AtlasError::Illegal("error of a light"));
             }
             let end = named + usize::from(record.name_length);
-            if self.names.get(named..end).is_none() {
+            if !K::ONLY_EXPONENTIAL && self.names.get(named..end).is_none() {
                 return Err(AtlasError::Illegal("light name"));
             }
             named = end;
         }
-        if named == self.names.len() {
+        if named == self.counts.names as usize {
             Ok(())
         } else {
             Err(AtlasError::Illegal("light name"))
@@ -177,7 +201,8 @@ impl<'a> Atlas<'a> {
         let (lights, mut names) = (self.lights, self.names);
         (0..self.counts.lights).filter_map(move |tag| {
             let record = LightRecord::parse(record(lights, tag, LIGHT_BYTES))?;
-            let (name, rest) = names.split_at_checked(usize::from(record.name_length))?;
+            let named = names.split_at_checked(usize::from(record.name_length));
+            let (name, rest) = named.unwrap_or_default();
             names = rest;
             Some(AtlasLight {
                 name,
@@ -188,6 +213,12 @@ impl<'a> Atlas<'a> {
                 error: record.error,
             })
         })
+    }
+
+    /// What a light is packed in; `None` without such a light.
+    #[must_use]
+    pub fn code(&self, light: u32) -> Option<Code> {
+        code_at(self.lights, light)
     }
 
     /// What the codes of a light stand for, and the largest of each channel; `None` without such a light.
@@ -534,9 +565,7 @@ fn curve(code: Code, input: &mut Input) -> Option<(Curve, u16)> {
             unit,
             steps: input.take()?,
         };
-        let last = u8::MAX.into();
-        let is_legal = unit <= LARGEST_PART_UNIT && curve.reaches(last);
-        return is_legal.then_some((curve, last));
+        return (unit <= LARGEST_PART_UNIT).then_some((curve, u8::MAX.into()));
     }
     let (first, step, last) = (input.u32()?, input.u32()?, input.u16()?);
     let curve = match code {
@@ -552,7 +581,7 @@ fn curve(code: Code, input: &mut Input) -> Option<(Curve, u16)> {
     } else {
         last == u16::from(u8::MAX)
     };
-    (is_legal && curve.reaches(last)).then_some((curve, last))
+    is_legal.then_some((curve, last))
 }
 
 /// The code of light `tag` of a table of lights; `None` when there is no such code.

@@ -1,7 +1,7 @@
 extern crate std;
 
 use super::*;
-use crate::code::{Code, Curve, Scale};
+use crate::code::{AllCodes, Code, Curve, Scale};
 use crate::mesh::{MeshStorage, Spacing, subdivide};
 use crate::scene::{Scene, Surface};
 use glam::Vec3;
@@ -210,7 +210,7 @@ fn a_newer_version_says_so() {
 
 /// Puts the right checksum on bytes that were changed on purpose.
 fn resign(bytes: &mut [u8]) {
-    if let Some(sum) = checksum(bytes) {
+    if let Some(sum) = checksum::<AllCodes>(bytes) {
         bytes[CHECKSUM_AT..CHECKSUM_AT + 4].copy_from_slice(&sum.to_le_bytes());
     }
 }

@@ -4,7 +4,7 @@ use super::{
     AtlasError, CHECKSUM_AT, CountsOf, HEADER_BYTES, LARGEST_TILE_CODE, MAGIC, NO_LIGHT,
     NOT_MEASURED, Quantity, VERSION, WorstError, checksum,
 };
-use crate::code::{Code, Curve, LARGEST_PART_FIRST, LARGEST_PART_UNIT, Scale};
+use crate::code::{AllCodes, Code, Curve, LARGEST_PART_FIRST, LARGEST_PART_UNIT, Scale};
 use crate::color::Rgb;
 use crate::geometry::Polygon;
 use crate::mesh::{Mesh, Side};
@@ -143,7 +143,7 @@ pub fn write(
         mesh_parts(surfaces, mesh, &mut output)?;
     }
 
-    let sum = checksum(bytes).ok_or(AtlasError::Full { needed })?;
+    let sum = checksum::<AllCodes>(bytes).ok_or(AtlasError::Full { needed })?;
     let mut place = Output {
         rest: bytes.get_mut(CHECKSUM_AT..).unwrap_or_default(),
     };
@@ -248,7 +248,7 @@ fn put_curve(code: Code, curve: Curve, last: u16, output: &mut Output) -> Result
     } else {
         last == u16::from(u8::MAX)
     };
-    if !is_legal || !curve.reaches(last) {
+    if !is_legal || !curve.reaches::<AllCodes>(last) {
         return Err(AtlasError::Unfit(
             "a contribution beyond its code; change the emission",
         ));

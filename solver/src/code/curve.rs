@@ -22,9 +22,10 @@
 //! 0.83 % for 256 lights. (A decoded `f32` below 2^-141 is rounded to the grid of subnormal floats, which is
 //! coarser than that; its [`Magnitude`] is not.)
 
+use super::known::exponential;
 use super::scale::Scale;
 use super::tables::{POWERS, SRGB};
-use super::{DECODED_BITS, decode, decode_fixed, encode, error_bound};
+use super::{Known, decode, encode, error_bound};
 use crate::math;
 
 /// Steps of the logarithmic code in an octave.
@@ -214,10 +215,7 @@ impl Curve {
     #[must_use]
     pub fn magnitude(&self, code: u16) -> Magnitude {
         match *self {
-            Self::Exponential { .. } => Magnitude {
-                mantissa: decode_fixed(byte(code)).into(),
-                exponent: -(DECODED_BITS as i32),
-            },
+            Self::Exponential { .. } => exponential(code),
             Self::Display { .. } | Self::Parts { .. } => display_magnitude(self.units(code)),
             Self::Logarithmic { first } => {
                 let Some(steps) = code.checked_sub(1) else {
@@ -235,8 +233,8 @@ impl Curve {
 
     /// Whether a code has a value below 2^127, and so has its [`Self::magnitude`]; without floats.
     #[must_use]
-    pub fn reaches(&self, code: u16) -> bool {
-        let (value, scale) = (self.magnitude(code), self.scale());
+    pub fn reaches<K: Known>(&self, code: u16) -> bool {
+        let (value, scale) = (K::magnitude(self, code), self.scale());
         let octave = |mantissa: u64, exponent: i32| 64 - mantissa.leading_zeros() as i32 + exponent;
         let product = u64::from(value.mantissa) * u64::from(scale.mantissa());
         octave(value.mantissa.into(), value.exponent) <= 127

@@ -19,6 +19,7 @@
 
 mod curve;
 mod exponential;
+mod known;
 mod scale;
 mod tables;
 
@@ -31,6 +32,7 @@ pub use curve::{
 pub use exponential::{
     DECODED, DECODED_BITS, LARGEST, SATURATED, decode, decode_fixed, encode, error_bound,
 };
+pub use known::{AllCodes, ExponentialCodes, Known};
 pub use scale::Scale;
 
 /// What the contributions of a light are written in.

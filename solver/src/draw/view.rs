@@ -56,24 +56,21 @@ impl View {
     ///
     /// `nearness` multiplies the reciprocal depth: above 1 it wins over what lies in the same plane.
     pub(super) fn project(&self, polygon: &Polygon, nearness: f32) -> Option<Outline> {
-        let relative: Clipped = polygon
-            .vertices()
-            .iter()
-            .map(|vertex| *vertex - self.eye)
-            .take(4)
-            .collect();
+        // `collect` would have a path to a panic, for more vertices than fit.
+        let mut relative = Clipped::new();
+        for vertex in polygon.vertices() {
+            let _ = relative.push(*vertex - self.eye);
+        }
         let visible = clip(&relative, |v| v.dot(self.forward) - self.near);
-        let outline: Outline = visible
-            .iter()
-            .map(|v| {
-                let depth = v.dot(self.forward).recip();
-                let offset = Vec2::new(v.dot(self.right), -v.dot(self.up));
-                Vertex {
-                    at: self.middle + offset * (self.focal * depth),
-                    depth: depth * nearness,
-                }
-            })
-            .collect();
+        let mut outline = Outline::new();
+        for v in &visible {
+            let depth = v.dot(self.forward).recip();
+            let offset = Vec2::new(v.dot(self.right), -v.dot(self.up));
+            let _ = outline.push(Vertex {
+                at: self.middle + offset * (self.focal * depth),
+                depth: depth * nearness,
+            });
+        }
         (!outline.is_empty()).then_some(outline)
     }
 
@@ -170,7 +167,9 @@ impl Span {
         };
         let samples = samples.get_mut(first..end.min(width)).unwrap_or_default();
         for (sample, column) in samples.iter_mut().zip(first..) {
-            let offset = (column as f32 + 0.5 - self.left.at.x).clamp(0.0, length);
+            // `clamp` panics where a length is no number.
+            let offset = column as f32 + 0.5 - self.left.at.x;
+            let offset = offset.min(length).max(0.0);
             let depth = self.left.depth + slope * offset;
             if depth > sample.depth {
                 *sample = Sample { depth, color };

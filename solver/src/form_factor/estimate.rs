@@ -1,12 +1,12 @@
-//! A row for a third of the price: the unoccluded factor times a few segments of visibility.
+//! A cheaper row: the unoccluded factor times a few segments of visibility.
 //!
 //! Where nothing stands between, `F_ji` is Lambert's formula `L` from the middle of element `j` to patch `i`, or its
 //! average over the receiver points where the patch is near. Where something does,
 //!
 //! `F_ji = sum_g w_g L(x_g, P_i) V(x_g, y_g)`
 //!
-//! with a weight `w_g` for each receiver point `x_g`, and `V` 1 where no blocker crosses the segment from there to its
-//! own point `y_g` of the patch, else 0. The analytic factor: Baum, Rushmeier and Winget 1989; segments to a
+//! with a weight `w_g` for each receiver point `x_g`, and `V` 1 where nothing crosses the segment from there to its
+//! own point `y_g` of the patch, or lies on top of it, else 0. The analytic factor: Baum, Rushmeier and Winget 1989; segments to a
 //! stratified shooter: Wallace, Elmquist and Haines 1989.
 //!
 //! Assumption: whoever asks knows better what such factors add up to, and scales them
@@ -14,46 +14,42 @@
 
 use glam::Vec3;
 
-use super::{Shooter, blockers, fill_with};
-use crate::geometry::{Polygon, gauss_points};
+use super::lanes::Numbers;
+use super::{Receiver, Shooter, View, fill_with};
+use crate::geometry::Polygon;
 use crate::mesh::Mesh;
-use crate::visibility::{Shaft, Visibility};
+use crate::visibility::Visibility;
 
 /// Longest edges of a receiver within which a patch is near: beyond, the factor of the middle is within 1 % of the
 /// average, since an inverse square changes by `(1/3)^2 / 12` over three edges.
 const NEAR: f32 = 3.0;
 
-impl Shooter {
+impl View<'_> {
     /// An estimate of [`Self::form_factor`], in [0, 1].
     #[must_use]
-    pub fn estimate(&self, receiver: &Polygon, visibility: &impl Visibility) -> f32 {
-        if self.is_out_of_sight(receiver) {
+    pub fn estimate(&self, receiver: &Receiver, visibility: &impl Visibility) -> f32 {
+        if self.is_hidden() {
             return 0.0;
         }
-        let normal = receiver.normal();
-        let blockers = blockers(|| Shaft::new(receiver, &self.polygon), visibility);
-        let is_open = blockers
-            .as_ref()
-            .is_some_and(|blockers| blockers.is_empty());
-        if is_open && !self.is_near(receiver) {
-            return self.open_at_point(receiver.center(), normal);
+        let shooter = self.shooter();
+        if self.is_open() && !shooter.is_near(receiver.polygon()) {
+            return shooter.open_at_point(receiver.polygon().center(), self.normal());
         }
-        let sees = |from: Vec3, to: Vec3| match &blockers {
-            Some(blockers) => !blockers.iter().any(|b| b.crossing(from, to).is_some()),
-            None => visibility.sees(from, to),
-        };
-        let points = gauss_points(receiver);
-        let factors = points.iter().zip(self.own_points()).map(|(point, own)| {
-            let open = self.open_at_point(point.position, normal);
-            if open > 0.0 && (is_open || sees(point.position, own)) {
-                point.weight * open
-            } else {
-                0.0
+        let Numbers(mut factors) = self.open_factors(receiver);
+        if !self.is_open() {
+            let segments = receiver.positions().into_iter().zip(shooter.own_points());
+            for (factor, (from, to)) in factors.iter_mut().zip(segments) {
+                let is_seen = || !shooter.is_covered(to) && visibility.sees(from, to);
+                if *factor > 0.0 && !is_seen() {
+                    *factor = 0.0;
+                }
             }
-        });
-        factors.sum::<f32>().min(1.0)
+        }
+        receiver.average(Numbers(factors))
     }
+}
 
+impl Shooter {
     /// True when the middle of the receiver does not stand for all of it.
     #[must_use]
     pub fn is_near(&self, receiver: &Polygon) -> bool {
@@ -77,7 +73,5 @@ pub fn estimate(
     visibility: &impl Visibility,
     row: &mut [f32],
 ) {
-    fill_with(mesh, first, row, |_, receiver| {
-        shooter.estimate(&receiver, visibility)
-    });
+    fill_with(mesh, shooter, first, visibility, row, View::estimate);
 }

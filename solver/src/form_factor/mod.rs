@@ -23,8 +23,8 @@ use glam::{Vec2, Vec3};
 use heapless::Vec;
 
 use crate::geometry::{Polygon, SamplePoint, as_many, from_unit_square};
-use crate::mesh::{Element, Mesh};
-use crate::visibility::{Shaft, Visibility};
+use crate::mesh::{Face, Mesh};
+use crate::visibility::Visibility;
 
 pub use estimate::estimate;
 pub use lambert::point_to_polygon;
@@ -71,17 +71,33 @@ impl Shooter {
     /// A patch of a mesh, without what lies on top of it; `None` for one that the mesh does not have.
     #[must_use]
     pub fn of_patch(mesh: &Mesh, patch: u32, visibility: &impl Visibility) -> Option<Self> {
-        let mut shooter = Self::new(mesh.patch_polygon(patch)?);
         let face = mesh.patches.get(patch as usize)?.face;
-        let surface = mesh.faces.get(face as usize)?.surface;
-        let facing = shooter.polygon.normal();
-        visibility.above(surface, facing, &mut |cover| {
-            let _ = shooter.covers.push(*cover);
-        });
-        Some(shooter)
+        let face = mesh.faces.get(face as usize)?;
+        Some(Self::of_face(face, visibility).part(mesh.patch_polygon(patch)?))
     }
 
-    fn is_covered(&self, point: Vec3) -> bool {
+    /// A whole face, without what lies on top of it.
+    #[must_use]
+    pub fn of_face(face: &Face, visibility: &impl Visibility) -> Self {
+        let mut shooter = Self::new(face.polygon);
+        visibility.above(face.surface, face.polygon.normal(), &mut |cover| {
+            let _ = shooter.covers.push(*cover);
+        });
+        shooter
+    }
+
+    /// A part of it.
+    #[must_use]
+    pub fn part(&self, polygon: Polygon) -> Self {
+        Self {
+            covers: self.covers.clone(),
+            ..Self::new(polygon)
+        }
+    }
+
+    /// True for a point of it on which something lies.
+    #[must_use]
+    pub fn is_covered(&self, point: Vec3) -> bool {
         self.covers.iter().any(|cover| cover.holds(point))
     }
 
@@ -138,21 +154,6 @@ impl Shooter {
     }
 }
 
-/// All that a shaft admits; `None` when it is more than [`BLOCKERS`].
-fn blockers(
-    shaft: impl FnOnce() -> Shaft,
-    visibility: &impl Visibility,
-) -> Option<Vec<&Polygon, BLOCKERS>> {
-    let mut blockers = Vec::new();
-    let mut fits = true;
-    if visibility.may_block() {
-        visibility.between(&shaft(), &mut |blocker| {
-            fits &= blockers.push(blocker.polygon).is_ok();
-        });
-    }
-    fits.then_some(blockers)
-}
-
 /// True when all of `other` lies behind the plane of `polygon`, or in it.
 fn faces_away(polygon: &Polygon, other: &Polygon) -> bool {
     other.vertices().iter().all(|v| {
@@ -172,8 +173,22 @@ pub fn fill(
     visibility: &impl Visibility,
     row: &mut [f32],
 ) {
+    fill_with(mesh, shooter, first, visibility, row, View::form_factor);
+}
+
+/// Fills `row[j]` with what `factor` says of element `first + j`; 0 beyond the mesh.
+fn fill_with<'s, V: Visibility>(
+    mesh: &Mesh,
+    shooter: &'s Shooter,
+    first: u32,
+    visibility: &'s V,
+    row: &mut [f32],
+    factor: impl Fn(&View<'s>, &Receiver, &V) -> f32,
+) {
+    let elements = mesh.elements.get(first as usize..).unwrap_or_default();
+    row.fill(0.0);
     let mut near: Option<(u32, View)> = None;
-    fill_with(mesh, first, row, |element, receiver| {
+    for (value, element) in row.iter_mut().zip(elements) {
         // Neighbours are of the same patch, for which what stands between is looked up once.
         let known = near.take().filter(|(patch, _)| *patch == element.patch);
         let look_up = || {
@@ -181,24 +196,9 @@ pub fn fill(
             Some((element.patch, shooter.seen_by(&patch, visibility)))
         };
         near = known.or_else(look_up);
-        near.as_ref().map_or(0.0, |(_, view)| {
-            view.form_factor(&Receiver::new(receiver), visibility)
-        })
-    });
-}
-
-/// Fills `row[j]` with what `factor` says of element `first + j`; 0 beyond the mesh.
-fn fill_with(
-    mesh: &Mesh,
-    first: u32,
-    row: &mut [f32],
-    mut factor: impl FnMut(&Element, Polygon) -> f32,
-) {
-    let elements = mesh.elements.get(first as usize..).unwrap_or_default();
-    row.fill(0.0);
-    for (value, element) in row.iter_mut().zip(elements) {
-        if let Some(receiver) = mesh.element_polygon(element) {
-            *value = factor(element, receiver);
+        let receiver = mesh.element_polygon(element).map(Receiver::new);
+        if let (Some((_, view)), Some(receiver)) = (&near, receiver) {
+            *value = factor(view, &receiver, visibility);
         }
     }
 }

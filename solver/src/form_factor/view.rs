@@ -7,7 +7,7 @@ use glam::Vec3;
 use heapless::Vec;
 
 use super::lambert::{Outline, lambert};
-use super::lanes::{Numbers, Vectors};
+use super::lanes::{Mask, Numbers, Vectors};
 use super::visible::{Blocker, Hides, Points, hides, visible_factors};
 use super::{BLOCKERS, Shooter};
 use crate::geometry::{Plane, Polygon, SamplePoint, as_many, clip, gauss_points};
@@ -46,6 +46,17 @@ impl Receiver {
     #[must_use]
     pub const fn polygon(&self) -> &Polygon {
         &self.polygon
+    }
+
+    /// Its points.
+    pub(super) fn positions(&self) -> [Vec3; 4] {
+        self.points.lanes()
+    }
+
+    /// The average over its area of what its points see, in [0, 1].
+    pub(super) fn average(&self, factors: Numbers) -> f32 {
+        let Numbers([a, b, c, d]) = factors * Numbers(self.weights);
+        (a + b + c + d).min(1.0)
     }
 }
 
@@ -185,6 +196,15 @@ impl<'s> View<'s> {
         self.outline.is_empty()
     }
 
+    /// True where nothing stands between.
+    pub(super) fn is_open(&self) -> bool {
+        self.is_exact && self.blockers.is_empty()
+    }
+
+    pub(super) const fn normal(&self) -> Vec3 {
+        self.normal
+    }
+
     /// `F_ji` of the receiver, or of a part of it: what its points see of the shooter, averaged over its
     /// area. In [0, 1].
     #[must_use]
@@ -201,19 +221,28 @@ impl<'s> View<'s> {
         }
         let points = self.points(receiver.points, receiver.magnitude);
         let factors = self.exact(&points).unwrap_or_else(|| {
-            let samples = receiver
-                .points
-                .lanes()
-                .into_iter()
-                .zip(&self.shooter.samples);
+            let samples = receiver.positions().into_iter().zip(&self.shooter.samples);
             let mut factors = [0.0; 4];
             for (factor, (point, samples)) in factors.iter_mut().zip(samples) {
                 *factor = self.sampled(point, samples, visibility);
             }
             Numbers(factors)
         });
-        let Numbers([a, b, c, d]) = factors * Numbers(receiver.weights);
-        (a + b + c + d).min(1.0)
+        receiver.average(factors)
+    }
+
+    /// What the points of a receiver would see if nothing stood between.
+    pub(super) fn open_factors(&self, receiver: &Receiver) -> Numbers {
+        let points = self.points(receiver.points, receiver.magnitude);
+        let facing = self.facing(&points);
+        let factors = self.open(&points).within(facing);
+        factors.map(|factor| factor.max(0.0))
+    }
+
+    /// The points that are before the shooter.
+    fn facing(&self, points: &Points) -> Mask {
+        let (height, tolerance) = points.height(&self.shooter.polygon.plane());
+        height.above(tolerance)
     }
 
     fn points(&self, world: Vectors, magnitude: Numbers) -> Points {
@@ -231,12 +260,11 @@ impl<'s> View<'s> {
 
     /// The factors of what is visible; `None` when the blockers are too many to be cut out.
     fn exact(&self, points: &Points) -> Option<Numbers> {
-        let (height, tolerance) = points.height(&self.shooter.polygon.plane());
-        let facing = height.above(tolerance);
+        let facing = self.facing(points);
         if facing == 0 {
             return Some(Numbers::ZERO);
         }
-        let factors = if self.blockers.is_empty() {
+        let factors = if self.is_open() {
             self.open(points)
         } else if self.is_exact {
             visible_factors(points, self.normal, &self.outline, &self.blockers)?

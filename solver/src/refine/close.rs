@@ -1,6 +1,6 @@
 //! Rows that are missing in the end are estimated: their light is sent where it may go, not left out.
 //!
-//! An estimated row `K_i` ([`crate::form_factor::estimate`]) costs a third of an exact one. What the factors of a
+//! An estimated row `K_i` ([`crate::form_factor::estimate`]) is cheaper than an exact one. What the factors of a
 //! receiver `j` add up to is known better than any of them. With `S` the known patches and `M` the others,
 //!
 //! `F_ji = K_ji r_j / (d_j + sum_{i in M} K_ji)`, `r_j = 1 - sum_{i in S} F_ji`,

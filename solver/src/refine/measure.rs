@@ -8,16 +8,18 @@ impl<const K: usize> Refinement<'_, K> {
     /// The largest residual of all lights.
     #[must_use]
     pub fn residual(&self) -> f32 {
-        self.residual_of(|_| true)
+        (0..self.storage.blocks.len())
+            .flat_map(|block| self.block_residuals(block, |_| true))
+            .fold(0.0, f32::max)
     }
 
-    pub(super) fn residual_of(&self, admit: impl Fn(&PatchState) -> bool) -> f32 {
+    /// True when no light has a residual above the goal by the patches that `admit` lets pass.
+    ///
+    /// While refinement goes on, the first block of lights mostly says so already.
+    pub(super) fn is_done(&self, admit: impl Fn(&PatchState) -> bool) -> bool {
+        let above = |residual: &f32| *residual > self.residual;
         (0..self.storage.blocks.len())
-            .map(|block| {
-                let residuals = self.block_residuals(block, &admit);
-                residuals.iter().copied().fold(0.0, f32::max)
-            })
-            .fold(0.0, f32::max)
+            .all(|block| !self.block_residuals(block, &admit).iter().any(above))
     }
 
     /// Residual of one light; 0 for a light that emits nothing or does not exist.

@@ -192,14 +192,13 @@ impl<'a, const K: usize> Refinement<'a, K> {
     pub fn next_shooter(&mut self) -> Option<u32> {
         let is_known = |state: &PatchState| state.row != 0;
         let is_unknown = |state: &PatchState| state.row == 0;
-        if self.rows_kept > 0 {
-            let nearly_done = self.residual_of(is_unknown) <= self.residual;
-            if nearly_done || self.merit(is_known) > self.merit(is_unknown) {
-                self.settle();
-            }
+        if self.rows_kept > 0
+            && (self.is_done(is_unknown) || self.merit(is_known) > self.merit(is_unknown))
+        {
+            self.settle();
         }
         // What known patches hold is solved for in the end.
-        if self.residual_of(is_unknown) <= self.residual {
+        if self.is_done(is_unknown) {
             return None;
         }
         self.best(is_unknown)

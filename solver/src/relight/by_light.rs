@@ -6,7 +6,7 @@
 use core::num::NonZeroUsize;
 
 use super::frame::{Encode, Finish, FrameMix};
-use super::packed::Form;
+use super::packed::{Form, fill_change, fill_table};
 use super::{RelightError, check_elements};
 use crate::atlas::Atlas;
 
@@ -17,14 +17,13 @@ use crate::atlas::Atlas;
 pub fn add_lights<F: Form>(
     atlas: &Atlas,
     mix: &FrameMix,
-    table: &mut F::Table<1>,
+    table: &mut F::Table,
     sums: &mut [F::Sum],
 ) -> Result<(), RelightError> {
     check_elements(atlas, sums.len())?;
     sums.fill(F::Sum::default());
     for light in 0..atlas.light_count() {
-        let after = mix.terms(atlas, light, F::BITS)?;
-        F::fill(table, 0, None, &after);
+        fill_table::<F>(atlas, mix, light, table)?;
         add::<F>(atlas, light, table, sums)?;
     }
     Ok(())
@@ -38,15 +37,12 @@ pub fn change_light<F: Form>(
     atlas: &Atlas,
     mix: &mut FrameMix,
     (light, levels): (u32, [u16; 3]),
-    table: &mut F::Table<1>,
+    table: &mut F::Table,
     sums: &mut [F::Sum],
 ) -> Result<(), RelightError> {
     check_elements(atlas, sums.len())?;
     F::codes(atlas).ok_or(RelightError::Code)?;
-    let before = mix.terms(atlas, light, F::BITS)?;
-    mix.set(light, levels);
-    let after = mix.terms(atlas, light, F::BITS)?;
-    F::fill(table, 0, Some(&before), &after);
+    fill_change::<F>(atlas, mix, (light, levels), table)?;
     add::<F>(atlas, light, table, sums)
 }
 
@@ -54,7 +50,7 @@ pub fn change_light<F: Form>(
 fn add<F: Form>(
     atlas: &Atlas,
     light: u32,
-    table: &F::Table<1>,
+    table: &F::Table,
     sums: &mut [F::Sum],
 ) -> Result<(), RelightError> {
     let codes = F::codes(atlas).ok_or(RelightError::Code)?;
@@ -63,7 +59,7 @@ fn add<F: Form>(
     let rows = codes.chunks_exact(lights.get());
     for (sum, row) in sums.iter_mut().zip(rows) {
         if let Some(codes) = row.get(light as usize) {
-            *sum = F::add(*sum, table, 0, codes);
+            *sum = F::add(*sum, table, codes);
         }
     }
     Ok(())

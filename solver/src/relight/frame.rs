@@ -9,15 +9,16 @@
 //! What is shown of a sum is `i = floor(2^-(b + 5) q sum)`, one of [`STEPS`] linear steps, where `q` of 16 bits holds
 //! reflectance, exposure and `1 / pi`; [`Encode`] makes a pixel of three such steps.
 //!
-//! Error of a sum, in units of `2^-b S`: half for every light that is on, and of the sum itself `2^-14` by
+//! Error of a sum, in units of `2^-b S`: half for every light that is on, and of the sum itself `2^-13` by
 //! the mantissas. Nothing here computes with floats: those that an atlas stores are taken apart bit by bit.
 
 use core::f32::consts::FRAC_1_PI;
-use core::num::NonZeroUsize;
 
 use super::{RelightError, Wide, check_lights};
-use crate::atlas::{Atlas, AtlasLight, Block, LARGEST_SIDE, Tiles};
-use crate::code::{Curve, DECODED, DECODED_BITS, Magnitude, Scale};
+use crate::atlas::{Atlas, Block, LARGEST_SIDE, Tiles};
+use crate::code::{
+    AllCodes, Code, Curve, DECODED, DECODED_BITS, ExponentialCodes, Known, Magnitude, Scale,
+};
 use crate::color::Rgb;
 
 /// Linear steps from black up that a display encodes.
@@ -30,7 +31,7 @@ const BITS: i32 = 16;
 const EXPONENTIAL: i32 = -(DECODED_BITS as i32);
 
 /// Elements that are looked at together.
-const CHUNK: usize = 16;
+const CHUNK: usize = 8;
 
 /// The fewest bits of a sum.
 pub(super) const FEWEST_BITS: u32 = 10;
@@ -68,13 +69,20 @@ impl Gain {
         }
     }
 
+    /// Whether the factor times a reflectance has no more than 16 bits.
+    fn fits(self, reflectance: u16) -> bool {
+        let product = u32::from(self.mantissa) * u32::from(reflectance);
+        let bits = i32::from(self.exponent) - product.leading_zeros() as i32;
+        product == 0 || bits <= -16
+    }
+
     /// The factor times a level, for sums of so many bits.
     pub(super) fn weight(self, level: u16, bits: u32) -> Weight {
         let product = u32::from(self.mantissa) * u32::from(level);
-        let excess = 16_u32.saturating_sub(product.leading_zeros());
+        let excess = 17_u32.saturating_sub(product.leading_zeros());
         let shift = -(i32::from(self.exponent) + excess as i32 + bits as i32);
         match u32::try_from(shift) {
-            Ok(shift @ 2..=32) => Weight {
+            Ok(shift @ 1..=31) => Weight {
                 mantissa: product >> excess,
                 shift,
             },
@@ -86,21 +94,21 @@ impl Gain {
 /// What multiplies a value of 16 bits: `mantissa * 2^-shift`, rounded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weight {
-    /// Below 2^16.
+    /// Below 2^15.
     mantissa: u32,
-    /// From 2 to 32.
+    /// From 1 to 31.
     shift: u32,
 }
 
 impl Weight {
     pub(super) const ZERO: Self = Self {
         mantissa: 0,
-        shift: 2,
+        shift: 1,
     };
 
     /// The product; halves round up.
     pub(super) const fn of(self, value: u32) -> u32 {
-        (((self.mantissa * value) >> (self.shift - 1)) + 1) >> 1
+        (self.mantissa * value + (1 << (self.shift - 1))) >> self.shift
     }
 }
 
@@ -113,38 +121,47 @@ pub struct Values {
 }
 
 impl Values {
-    pub(super) fn new(curve: Curve, last: u16) -> Self {
-        let largest = curve.magnitude(last);
-        let excess = 16 - largest.mantissa.leading_zeros() as i32;
+    pub(super) fn new<K: Known>(curve: Curve, last: u16) -> Self {
+        let exponent = if K::ONLY_EXPONENTIAL {
+            EXPONENTIAL
+        } else {
+            let largest = K::magnitude(&curve, last);
+            largest.exponent + 16 - largest.mantissa.leading_zeros() as i32
+        };
         Self {
             curve,
             last,
-            exponent: largest.exponent + excess,
+            exponent,
         }
     }
 
     /// Calls `f` with one entry and value after the other, from code 0 on.
     #[inline(always)]
-    pub(super) fn with_codes<E>(
+    pub(super) fn with_codes<K: Known, E>(
         &self,
         entries: impl Iterator<Item = E>,
         mut f: impl FnMut(E, u32),
     ) {
-        if matches!(self.curve, Curve::Exponential { .. }) && self.exponent == EXPONENTIAL {
+        let is_exponential = matches!(self.curve, Curve::Exponential { .. });
+        if K::ONLY_EXPONENTIAL || is_exponential && self.exponent == EXPONENTIAL {
             for (entry, value) in entries.zip(&DECODED) {
                 f(entry, u32::from(*value));
             }
         } else {
             for (entry, code) in entries.zip(0..) {
-                f(entry, self.of(code));
+                f(entry, self.of::<K>(code));
             }
         }
     }
 
     /// Below 2^16.
-    pub(super) fn of(&self, code: u16) -> u32 {
-        let value = self.curve.magnitude(code.min(self.last));
-        let shift = self.exponent - value.exponent;
+    pub(super) fn of<K: Known>(&self, code: u16) -> u32 {
+        let value = K::magnitude(&self.curve, code.min(self.last));
+        let shift = if K::ONLY_EXPONENTIAL {
+            0
+        } else {
+            self.exponent - value.exponent
+        };
         let distance = shift.unsigned_abs();
         if shift < 0 {
             value.mantissa << (distance & 15)
@@ -185,11 +202,36 @@ impl<'a> FrameMix<'a> {
     /// # Errors
     /// Slices that do not fit the atlas; weights that are negative or not finite; [`RelightError::Range`] with more than 1000
     /// lights.
+    #[inline(never)]
     pub fn new(
         atlas: &Atlas,
         full: &[Rgb],
         lights: &'a mut [FrameLight],
     ) -> Result<Self, RelightError> {
+        Self::fit::<AllCodes>(atlas, full, lights)
+    }
+
+    /// The same for an atlas in exponential codes only, by a program that knows no others.
+    ///
+    /// # Errors
+    /// As above, and [`RelightError::Code`] for lights in other codes.
+    #[inline(never)]
+    pub fn exponential(
+        atlas: &Atlas,
+        full: &[Rgb],
+        lights: &'a mut [FrameLight],
+    ) -> Result<Self, RelightError> {
+        Self::fit::<ExponentialCodes>(atlas, full, lights)
+    }
+
+    fn fit<K: Known>(
+        atlas: &Atlas,
+        full: &[Rgb],
+        lights: &'a mut [FrameLight],
+    ) -> Result<Self, RelightError> {
+        if !atlas.is_all_in(K::knows) {
+            return Err(RelightError::Code);
+        }
         super::check_mix(atlas, full)?;
         check_lights(atlas, lights.len())?;
         if full.len() > 1000 {
@@ -199,18 +241,12 @@ impl<'a> FrameMix<'a> {
             lights,
             full_scale: [Wide::ZERO; 3],
         };
-        for (light, full) in atlas.lights().zip(full) {
-            let values = light.curves.iter().zip(light.last);
-            let channels = mix.full_scale.iter_mut().zip(full.to_array()).zip(values);
-            for ((scale, full), (curve, last)) in channels {
-                let values = Values::new(*curve, last);
-                let largest = Wide::new(values.of(last).into(), 0);
-                *scale = scale.plus(unit(full, curve.scale(), &values).times(largest));
-            }
-        }
-        mix.fill_gains(atlas, full);
+        mix.for_units::<K>(atlas, full, |_, scale, unit, largest| {
+            *scale = scale.plus(unit.times(largest));
+        });
+        mix.fill_gains::<K>(atlas, full);
         // With every light by itself at its largest, some element is the brightest.
-        let brightest = mix.brightest(atlas);
+        let brightest = mix.brightest::<K>(atlas);
         let room = (1 << FEWEST_BITS) - 2 - full.len() as u32 / 2;
         for (scale, brightest) in mix.full_scale.iter_mut().zip(brightest) {
             let brightest = u64::from(brightest) + full.len() as u64;
@@ -218,30 +254,50 @@ impl<'a> FrameMix<'a> {
             let fits = grown.over(Wide::new(room.into(), 0));
             *scale = scale.times(fits);
         }
-        mix.fill_gains(atlas, full);
+        mix.fill_gains::<K>(atlas, full);
         Ok(mix)
     }
 
     /// Gains at the present full scale; levels become 0.
-    fn fill_gains(&mut self, atlas: &Atlas, full: &[Rgb]) {
-        let entries = self.lights.iter_mut().zip(atlas.lights()).zip(full);
-        for ((entry, light), full) in entries {
-            *entry = FrameLight::EMPTY;
-            let values = light.curves.iter().zip(light.last);
-            let channels = entry.gains.iter_mut().zip(self.full_scale);
+    fn fill_gains<K: Known>(&mut self, atlas: &Atlas, full: &[Rgb]) {
+        for light in self.lights.iter_mut() {
+            light.levels = [0; 3];
+        }
+        self.for_units::<K>(atlas, full, |gain, scale, unit, _| {
+            *gain = Gain::new(unit.over(*scale).scaled(-BITS));
+        });
+    }
+
+    /// Calls `f` for every light and channel with its gain, the full scale, what one of its values is worth, and the
+    /// largest of them.
+    #[inline(never)]
+    fn for_units<K: Known>(
+        &mut self,
+        atlas: &Atlas,
+        full: &[Rgb],
+        f: fn(&mut Gain, &mut Wide, Wide, Wide),
+    ) {
+        let entries = self.lights.iter_mut().zip(full).zip(0..);
+        for ((entry, full), light) in entries {
+            let Some((curves, last)) = atlas.curves(light) else {
+                continue;
+            };
+            let values = curves.iter().zip(last);
+            let channels = entry.gains.iter_mut().zip(&mut self.full_scale);
             for (((gain, scale), full), (curve, last)) in channels.zip(full.to_array()).zip(values)
             {
-                let values = Values::new(*curve, last);
-                *gain = Gain::new(unit(full, curve.scale(), &values).over(scale).scaled(-BITS));
+                let values = Values::new::<K>(*curve, last);
+                let largest = Wide::new(values.of::<K>(last).into(), 0);
+                f(gain, scale, unit(full, curve.scale(), &values), largest);
             }
         }
     }
 
     /// The largest sum of every channel with all lights at their full weights, in 2^-16 of the full scale.
-    fn brightest(&self, atlas: &Atlas) -> [u32; 3] {
-        let mut brightest = self.brightest_of_rows(atlas);
-        if let Some(tiles) = atlas.tiles() {
-            let in_tiles = self.brightest_of_tiles(atlas, &tiles);
+    fn brightest<K: Known>(&self, atlas: &Atlas) -> [u32; 3] {
+        let mut brightest = self.brightest_of_rows::<K>(atlas);
+        if let Some(tiles) = atlas.tiles().filter(|_| !K::ONLY_EXPONENTIAL) {
+            let in_tiles = self.brightest_of_tiles::<K>(atlas, &tiles);
             // No element has more of both.
             for (sum, other) in brightest.iter_mut().zip(in_tiles) {
                 *sum += other;
@@ -252,7 +308,7 @@ impl<'a> FrameMix<'a> {
 
     /// Of the lights in tiles. Its stack of 5 KB is its own.
     #[inline(never)]
-    fn brightest_of_tiles(&self, atlas: &Atlas, tiles: &Tiles) -> [u32; 3] {
+    fn brightest_of_tiles<K: Known>(&self, atlas: &Atlas, tiles: &Tiles) -> [u32; 3] {
         let mut brightest = [0; 3];
         let mut block: Block = [[0; 3]; LARGEST_SIDE * LARGEST_SIDE];
         for (place, mut bits) in tiles.iter() {
@@ -260,13 +316,9 @@ impl<'a> FrameMix<'a> {
             let lights = atlas.lights().zip(self.lights.iter());
             for (light, entry) in lights.filter(|(light, _)| light.code.is_tiled()) {
                 if bits.next_light(place, light.last, &mut block) {
-                    let terms = entry.full_terms(&light);
+                    let terms = entry.full_terms::<K>((light.curves, light.last));
                     for (sums, codes) in sums.iter_mut().zip(&block).take(place.len()) {
-                        for ((sum, (weight, values)), code) in
-                            sums.iter_mut().zip(&terms).zip(codes)
-                        {
-                            *sum += weight.of(values.of(*code));
-                        }
+                        add_terms::<K>(sums, &terms, *codes);
                     }
                 }
             }
@@ -276,37 +328,52 @@ impl<'a> FrameMix<'a> {
     }
 
     /// Of the lights that are not in tiles.
-    fn brightest_of_rows(&self, atlas: &Atlas) -> [u32; 3] {
-        let stride = atlas
-            .lights()
-            .map(|light| light.code.bytes())
-            .sum::<usize>();
-        let Some(stride) = NonZeroUsize::new(stride) else {
-            return [0; 3];
-        };
-        let mut brightest = [0; 3];
-        for rows in atlas.codes().chunks(stride.get().saturating_mul(CHUNK)) {
+    #[inline(never)]
+    fn brightest_of_rows<K: Known>(&self, atlas: &Atlas) -> [u32; 3] {
+        let codes = (0..).map_while(|light| atlas.code(light));
+        let stride = codes.map(Code::bytes).sum::<usize>();
+        let (mut rows, mut brightest) = (atlas.codes(), [0; 3]);
+        while !rows.is_empty() {
             let mut sums = [[0; 3]; CHUNK];
-            let mut rest = rows;
-            let lights = atlas.lights().zip(self.lights.iter());
-            for (light, entry) in lights.filter(|(light, _)| !light.code.is_tiled()) {
-                let terms = entry.full_terms(&light);
-                let mut codes = rest.chunks(stride.get());
-                for (sums, codes) in sums.iter_mut().zip(&mut codes) {
-                    let codes = match (light.code.bytes(), codes) {
-                        (3, [r, g, b, ..]) => [*r, *g, *b],
-                        (_, [luminance, ..]) => [*luminance; 3],
-                        _ => [0; 3],
-                    };
-                    for ((sum, (weight, values)), code) in sums.iter_mut().zip(&terms).zip(codes) {
-                        *sum += weight.of(values.of(code.into()));
+            let mut begin = 0;
+            for (entry, light) in self.lights.iter().zip(0..) {
+                let found = atlas.code(light).zip(atlas.curves(light));
+                let Some((code, curves)) = found.filter(|(code, _)| !code.is_tiled()) else {
+                    continue;
+                };
+                let terms = entry.full_terms::<K>(curves);
+                let mut at = begin;
+                for sums in &mut sums {
+                    match (code.bytes(), rows.get(at..)) {
+                        (3, Some(&[r, g, b, ..])) => add_terms::<K>(sums, &terms, [r, g, b]),
+                        (_, Some(&[luminance, ..])) => {
+                            add_terms::<K>(sums, &terms, [luminance; 3]);
+                        }
+                        _ => {}
                     }
+                    at += stride;
                 }
-                rest = rest.get(light.code.bytes()..).unwrap_or_default();
+                begin += code.bytes();
             }
             keep_largest(&mut brightest, &sums);
+            rows = rows.get(CHUNK * stride..).unwrap_or_default();
         }
         brightest
+    }
+
+    /// The gains of [`Finish`]; `None` where its error is [`RelightError::Range`].
+    #[inline(never)]
+    fn shown(&self, runs: &[Run], exposure: f32, white: u16) -> Option<[Shown; 3]> {
+        let is_positive = (1..0x7f80_0000).contains(&exposure.to_bits());
+        let white = Wide::new(white.into(), -(STEPS.ilog2() as i32));
+        let shown = Wide::from_float(exposure).times(Wide::from_float(FRAC_1_PI));
+        let shown = shown.times(white);
+        let gains = self.full_scale.map(|scale| Gain::new(shown.times(scale)));
+        let fits = |run: &Run| {
+            let mut channels = gains.iter().zip(run.reflectance);
+            channels.all(|(gain, reflectance)| gain.fits(reflectance))
+        };
+        (is_positive && runs.iter().all(fits)).then(|| gains.map(Shown::new))
     }
 
     /// Sets the levels of a light: shares of its full weight, 2^-16 each; without such a light nothing happens.
@@ -323,7 +390,7 @@ impl<'a> FrameMix<'a> {
     }
 
     /// What the codes of a light contribute to sums of so many bits.
-    pub(super) fn terms(
+    pub(super) fn terms<K: Known>(
         &self,
         atlas: &Atlas,
         light: u32,
@@ -333,32 +400,49 @@ impl<'a> FrameMix<'a> {
         let entry = self.lights.get(light as usize);
         let found = entry.zip(atlas.curves(light));
         let (entry, (curves, last)) = found.ok_or(RelightError::Lights { expected })?;
-        Ok(entry.terms(curves, last, bits))
+        Ok(with_values::<K>(entry.weights(bits), curves, last))
     }
 }
 
 /// What the codes of a light contribute, by channel.
 pub type Terms = [(Weight, Values); 3];
 
+fn with_values<K: Known>(weights: [Weight; 3], curves: [Curve; 3], last: [u16; 3]) -> Terms {
+    let ([r, g, b], [curve_r, curve_g, curve_b]) = (weights, curves);
+    let [last_r, last_g, last_b] = last;
+    [
+        (r, Values::new::<K>(curve_r, last_r)),
+        (g, Values::new::<K>(curve_g, last_g)),
+        (b, Values::new::<K>(curve_b, last_b)),
+    ]
+}
+
 impl FrameLight {
-    fn terms(&self, curves: [Curve; 3], last: [u16; 3], bits: [u32; 3]) -> Terms {
-        let ([r, g, b], [last_r, last_g, last_b]) = (curves, last);
-        let ([gain_r, gain_g, gain_b], [level_r, level_g, level_b]) = (self.gains, self.levels);
-        let [bits_r, bits_g, bits_b] = bits;
-        [
-            (gain_r.weight(level_r, bits_r), Values::new(r, last_r)),
-            (gain_g.weight(level_g, bits_g), Values::new(g, last_g)),
-            (gain_b.weight(level_b, bits_b), Values::new(b, last_b)),
-        ]
+    /// What multiplies the values of the codes.
+    #[inline(never)]
+    fn weights(&self, bits: [u32; 3]) -> [Weight; 3] {
+        let mut weights = [Weight::ZERO; 3];
+        let channels = weights.iter_mut().zip(self.gains);
+        for ((weight, gain), (level, bits)) in channels.zip(self.levels.iter().zip(bits)) {
+            *weight = gain.weight(*level, bits);
+        }
+        weights
     }
 
     /// At the full weight, in 2^-16 of the full scale.
-    fn full_terms(&self, light: &AtlasLight) -> Terms {
+    fn full_terms<K: Known>(&self, (curves, last): ([Curve; 3], [u16; 3])) -> Terms {
         let full = Self {
             levels: [u16::MAX; 3],
             ..*self
         };
-        full.terms(light.curves, light.last, [BITS as u32; 3])
+        with_values::<K>(full.weights([BITS as u32; 3]), curves, last)
+    }
+}
+
+/// Adds what the codes of a light contribute.
+fn add_terms<K: Known>(sums: &mut [u32; 3], terms: &Terms, codes: [impl Into<u16>; 3]) {
+    for ((sum, (weight, values)), code) in sums.iter_mut().zip(terms).zip(codes) {
+        *sum += weight.of(values.of::<K>(code.into()));
     }
 }
 
@@ -390,7 +474,9 @@ pub struct Run {
 #[derive(Debug)]
 pub struct Finish<'a, T> {
     runs: &'a [Run],
-    gains: [Gain; 3],
+    /// Of all runs.
+    elements: usize,
+    gains: [Shown; 3],
     pub(super) tone: &'a T,
 }
 
@@ -400,6 +486,7 @@ impl<'a, T: Encode> Finish<'a, T> {
     /// # Errors
     /// [`RelightError::Elements`]; [`RelightError::Range`] for an exposure that is not positive and finite, or under which an
     /// element may show brighter than the last of the [`STEPS`]: take a table with a lower white.
+    #[inline(never)]
     pub fn new(
         atlas: &Atlas,
         mix: &FrameMix,
@@ -407,48 +494,25 @@ impl<'a, T: Encode> Finish<'a, T> {
         exposure: f32,
         tone: &'a T,
     ) -> Result<Self, RelightError> {
-        let is_positive = (1..0x7f80_0000).contains(&exposure.to_bits());
-        let white = Wide::new(tone.white().into(), -(STEPS.ilog2() as i32));
-        let shown = Wide::from_float(exposure).times(Wide::from_float(FRAC_1_PI));
-        let gains = mix.full_scale.map(|scale| {
-            let gain = shown.times(white).times(scale);
-            Gain::new(gain)
-        });
-        let finish = Self { runs, gains, tone };
-        finish.check(atlas.element_count() as usize)?;
-        let fits = runs.iter().all(|run| finish.factors(run).is_some());
-        if is_positive && fits {
-            Ok(finish)
-        } else {
-            Err(RelightError::Range)
-        }
+        let elements = atlas.element_count() as usize;
+        check_runs(runs, elements)?;
+        let gains = mix.shown(runs, exposure, tone.white());
+        let gains = gains.ok_or(RelightError::Range)?;
+        Ok(Self {
+            runs,
+            elements,
+            gains,
+            tone,
+        })
     }
 
-    /// What multiplies the sums of a run, in 2^-16 steps of 2^-11 of the full scale; `None` beyond 16 bits.
-    fn factors(&self, run: &Run) -> Option<[u16; 3]> {
-        let ([r, g, b], [gain_r, gain_g, gain_b]) = (run.reflectance, self.gains);
-        let factor = |reflectance: u16, gain: Gain| {
-            let product = u32::from(gain.mantissa) * u32::from(reflectance);
-            // Between 0 and 31 for everything that fits and does not vanish.
-            match u32::try_from(-i32::from(gain.exponent)) {
-                Ok(shift @ 0..=31) => u16::try_from(product >> shift).ok(),
-                Ok(_) => Some(0),
-                Err(_) => (product == 0).then_some(0),
-            }
-        };
-        Some([factor(r, gain_r)?, factor(g, gain_g)?, factor(b, gain_b)?])
-    }
-
-    /// Whether the runs are so many elements.
+    /// Whether there are so many elements.
     pub(super) fn check(&self, elements: usize) -> Result<(), RelightError> {
-        let mut runs = self.runs.iter();
-        let left = runs.try_fold(elements, |left, run| {
-            left.checked_sub(run.elements as usize)
-        });
-        let expected = elements as u32;
-        match left {
-            Some(0) => Ok(()),
-            _ => Err(RelightError::Elements { expected }),
+        let expected = self.elements as u32;
+        if elements == self.elements {
+            Ok(())
+        } else {
+            Err(RelightError::Elements { expected })
         }
     }
 
@@ -462,9 +526,51 @@ impl<'a, T: Encode> Finish<'a, T> {
         self.check(pixels.len())?;
         for run in self.runs {
             let own = pixels.split_off_mut(..run.elements as usize);
-            let factors = self.factors(run).unwrap_or_default();
+            let ([r, g, b], [gain_r, gain_g, gain_b]) = (run.reflectance, self.gains);
+            let factors = [gain_r.factor(r), gain_g.factor(g), gain_b.factor(b)];
             f(own.unwrap_or_default(), factors);
         }
         Ok(())
+    }
+}
+
+/// What multiplies a reflectance, `mantissa * 2^-shift`, for a factor of sums in 2^-16 steps of 2^-11 of the full scale.
+#[derive(Clone, Copy, Debug)]
+struct Shown {
+    mantissa: u16,
+    /// Up to 31.
+    shift: u16,
+}
+
+impl Shown {
+    fn new(gain: Gain) -> Self {
+        match u16::try_from(-gain.exponent) {
+            Ok(shift @ 0..=31) => Self {
+                mantissa: gain.mantissa,
+                shift,
+            },
+            // Vanishes; or [`Gain::fits`] black only.
+            _ => Self {
+                mantissa: 0,
+                shift: 0,
+            },
+        }
+    }
+
+    const fn factor(self, reflectance: u16) -> u16 {
+        ((self.mantissa as u32 * reflectance as u32) >> self.shift) as u16
+    }
+}
+
+/// Whether the runs are so many elements.
+#[inline(never)]
+fn check_runs(runs: &[Run], elements: usize) -> Result<(), RelightError> {
+    let left = runs.iter().try_fold(elements, |left, run| {
+        left.checked_sub(run.elements as usize)
+    });
+    let expected = elements as u32;
+    match left {
+        Some(0) => Ok(()),
+        _ => Err(RelightError::Elements { expected }),
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Two [`Form`]s of codes, one for all lights of an atlas:
 //!
-//! * [`Lum`]: a luminance code stands for a colour once its light has one, so a light needs a table of 256 words that hold red,
+//! * [`Lum`]: a luminance code stands for a colour once its light has one, so a light has a table of 256 words that hold red,
 //!   green and blue side by side in 10, 12 and 10 bits, and one addition adds all three. The full scale of a
 //!   [`FrameMix`] keeps them from running into each other;
 //! * [`Colour`]: a table of 256 for each channel, in 16 bits.
@@ -12,12 +12,14 @@
 //! `K` is a constant because it halves the instructions. Any mixture of codes, tiles above all, goes through [`full_any`],
 //! which decodes first.
 
+use core::array;
 use core::hint::black_box;
 
-use super::frame::{Encode, Finish, FrameMix, Terms, Weight};
+use super::frame::{Encode, Finish, FrameLight, FrameMix, Terms, Weight};
 use super::{CodeTable, RelightError, check_elements};
-use crate::atlas::Atlas;
-use crate::code::Code;
+use crate::atlas::{Atlas, AtlasError};
+use crate::code::{AllCodes, Code, ExponentialCodes, Known};
+use crate::color::Rgb;
 
 /// Bits of red, green and blue in a packed word, red at the top.
 const PACKED: [u32; 3] = [10, 12, 10];
@@ -25,38 +27,57 @@ const PACKED: [u32; 3] = [10, 12, 10];
 /// Bits of a sum by itself.
 const SINGLE: u32 = 16;
 
+/// Whether this is a core of eight registers, ARMv6-M: of the ones that are supported, it alone has no compare-and-swap. Its
+/// loops are cut in another way; what they compute is the same.
+const IS_SMALL: bool = !cfg!(target_has_atomic = "32");
+
+/// Elements that look for a table together.
+const GROUP: usize = if IS_SMALL { 1 } else { 2 };
+
+/// Sums that are shown together.
+const SHOWN: usize = if IS_SMALL { 2 } else { 4 };
+
 /// How the codes of an element are stored, and their contributions summed.
 pub trait Form {
+    /// The codes that an atlas in this form may be in.
+    type Known: Known;
     /// What all lights of the atlas are written in has so many bytes.
     type Codes: Copy;
     /// The contribution of a light, or a sum of them.
     type Sum: Copy + Default;
-    /// What every code contributes of `L` lights; those of one code stand next to each other, which suits the addressing of
-    /// small cores best where `L` is a power of two.
-    type Table<const L: usize>;
+    /// What every code contributes of a light.
+    type Table;
 
     /// Bits of a sum.
     const BITS: [u32; 3];
+    /// Contributes nothing.
+    const EMPTY: Self::Table;
+
+    /// Reads an atlas, without its mesh, for the kernels of this form.
+    ///
+    /// # Errors
+    /// [`AtlasError`], also for codes that no atlas in this form may be in.
+    fn parse(bytes: &[u8]) -> Result<Atlas<'_>, AtlasError>;
+
+    /// [`FrameMix::new`] for the kernels of this form.
+    ///
+    /// # Errors
+    /// As there, and [`RelightError::Code`].
+    fn mix<'a>(
+        atlas: &Atlas,
+        full: &[Rgb],
+        lights: &'a mut [FrameLight],
+    ) -> Result<FrameMix<'a>, RelightError>;
 
     /// The codes of all elements, whose lights stand next to each other; `None` for lights in another form.
     fn codes<'a>(atlas: &Atlas<'a>) -> Option<&'a [Self::Codes]>;
 
-    /// Fills one light of a table with the difference of what two weights make of every code.
-    fn fill<const L: usize>(
-        table: &mut Self::Table<L>,
-        light: usize,
-        before: Option<&Terms>,
-        after: &Terms,
-    );
+    /// Puts what a weight makes of every code into a table; of a change, minus what it made before.
+    fn fill(table: &mut Self::Table, before: Option<&Terms>, after: &Terms);
 
     /// A sum, and what a table says of a light's codes.
     #[must_use]
-    fn add<const L: usize>(
-        sum: Self::Sum,
-        table: &Self::Table<L>,
-        light: usize,
-        codes: &Self::Codes,
-    ) -> Self::Sum;
+    fn add(sum: Self::Sum, table: &Self::Table, codes: &Self::Codes) -> Self::Sum;
 
     /// What is shown of a sum.
     #[must_use]
@@ -68,55 +89,70 @@ pub trait Form {
 pub struct Lum;
 
 impl Form for Lum {
+    type Known = ExponentialCodes;
     type Codes = u8;
     type Sum = u32;
-    type Table<const L: usize> = [[u32; L]; 256];
+    type Table = [u32; 256];
 
     const BITS: [u32; 3] = PACKED;
+    const EMPTY: [u32; 256] = [0; 256];
+
+    fn parse(bytes: &[u8]) -> Result<Atlas<'_>, AtlasError> {
+        Atlas::parse_exponential(bytes)
+    }
+
+    fn mix<'a>(
+        atlas: &Atlas,
+        full: &[Rgb],
+        lights: &'a mut [FrameLight],
+    ) -> Result<FrameMix<'a>, RelightError> {
+        FrameMix::exponential(atlas, full, lights)
+    }
 
     fn codes<'a>(atlas: &Atlas<'a>) -> Option<&'a [u8]> {
         let fits = atlas.is_all_in(|code| code == Code::Lum8);
         fits.then_some(atlas.codes())
     }
 
-    fn fill<const L: usize>(
-        table: &mut [[u32; L]; 256],
-        light: usize,
-        before: Option<&Terms>,
-        after: &Terms,
-    ) {
-        let [(r, values), (g, _), (b, _)] = after;
-        let [old_r, old_g, old_b] = weights(before);
-        let pack = |r: Weight, g: Weight, b: Weight, value| {
-            r.of(value) << 22 | g.of(value) << 10 | b.of(value)
-        };
-        let is_new = before.is_none();
-        let own = table.iter_mut().filter_map(|lights| lights.get_mut(light));
-        values.with_codes(own, |entry, value| {
-            let old = if is_new {
-                0
-            } else {
-                pack(old_r, old_g, old_b, value)
-            };
-            *entry = pack(*r, *g, *b, value).wrapping_sub(old);
-        });
+    fn fill(table: &mut [u32; 256], before: Option<&Terms>, after: &Terms) {
+        if let Some(before) = before {
+            fill_packed(table, before, 0);
+            fill_packed(table, after, u32::MAX);
+        } else {
+            fill_packed(table, after, 0);
+        }
     }
 
     #[inline(always)]
-    fn add<const L: usize>(sum: u32, table: &[[u32; L]; 256], light: usize, code: &u8) -> u32 {
-        sum.wrapping_add(entry(table, light, *code))
+    fn add(sum: u32, table: &[u32; 256], code: &u8) -> u32 {
+        sum.wrapping_add(entry(table, *code))
     }
 
     #[inline(always)]
     fn steps(sum: u32, factors: [u16; 3]) -> [u32; 3] {
         let [r, g, b] = factors.map(u32::from);
-        // Products of 10 or 12 bits and 16; steps of 11.
+        // Small cores take 16 bits out in two instructions, other numbers of bits in four: green has a piece of blue behind it.
+        let blue = if IS_SMALL {
+            ((sum << 6 & 0xffff) * b) >> 21
+        } else {
+            ((sum & 0x3ff) * b) >> 15
+        };
+        // Steps of 11 bits.
         [
             ((sum >> 22) * r) >> 15,
-            ((sum >> 10 & 0xfff) * g) >> 17,
-            ((sum & 0x3ff) * b) >> 15,
+            ((sum >> 6 & 0xffff) * g) >> 21,
+            blue,
         ]
     }
+}
+
+/// Puts what a weight makes of every code into a table, minus what is `kept` of it.
+#[inline(never)]
+fn fill_packed(table: &mut [u32; 256], [(r, values), (g, _), (b, _)]: &Terms, kept: u32) {
+    values.with_codes::<ExponentialCodes, _>(table.iter_mut(), |entry, value| {
+        let packed = r.of(value) << 22 | g.of(value) << 10 | b.of(value);
+        *entry = packed.wrapping_sub(*entry & kept);
+    });
 }
 
 /// All lights in codes of three bytes.
@@ -124,131 +160,180 @@ impl Form for Lum {
 pub struct Colour;
 
 impl Form for Colour {
+    type Known = AllCodes;
     type Codes = [u8; 3];
     type Sum = [u16; 3];
-    type Table<const L: usize> = [[[u16; L]; 256]; 3];
+    type Table = [[u16; 256]; 3];
 
     const BITS: [u32; 3] = [SINGLE; 3];
+    const EMPTY: [[u16; 256]; 3] = [[0; 256]; 3];
+
+    fn parse(bytes: &[u8]) -> Result<Atlas<'_>, AtlasError> {
+        Atlas::parse_codes(bytes)
+    }
+
+    fn mix<'a>(
+        atlas: &Atlas,
+        full: &[Rgb],
+        lights: &'a mut [FrameLight],
+    ) -> Result<FrameMix<'a>, RelightError> {
+        FrameMix::new(atlas, full, lights)
+    }
 
     fn codes<'a>(atlas: &Atlas<'a>) -> Option<&'a [[u8; 3]]> {
         let fits = atlas.is_all_in(|code| code.bytes() == 3);
         fits.then_some(atlas.codes().as_chunks().0)
     }
 
-    fn fill<const L: usize>(
-        tables: &mut [[[u16; L]; 256]; 3],
-        light: usize,
-        before: Option<&Terms>,
-        after: &Terms,
-    ) {
-        let channels = tables.iter_mut().zip(after).zip(weights(before));
-        for ((table, (weight, values)), old) in channels {
-            let own = table.iter_mut().filter_map(|lights| lights.get_mut(light));
-            values.with_codes(own, |entry, value| {
+    #[inline(never)]
+    fn fill(tables: &mut [[u16; 256]; 3], before: Option<&Terms>, after: &Terms) {
+        let old = before.map_or([Weight::ZERO; 3], |terms| terms.map(|(weight, _)| weight));
+        for ((table, (weight, values)), old) in tables.iter_mut().zip(after).zip(old) {
+            values.with_codes::<Self::Known, _>(table.iter_mut(), |entry, value| {
                 *entry = weight.of(value).wrapping_sub(old.of(value)) as u16;
             });
         }
     }
 
     #[inline(always)]
-    fn add<const L: usize>(
-        sum: [u16; 3],
-        tables: &[[[u16; L]; 256]; 3],
-        light: usize,
-        [code_r, code_g, code_b]: &[u8; 3],
-    ) -> [u16; 3] {
+    fn add(sum: [u16; 3], tables: &[[u16; 256]; 3], codes: &[u8; 3]) -> [u16; 3] {
         let ([r, g, b], [red, green, blue]) = (sum, tables);
+        let [code_r, code_g, code_b] = *codes;
         [
-            r.wrapping_add(entry(red, light, *code_r)),
-            g.wrapping_add(entry(green, light, *code_g)),
-            b.wrapping_add(entry(blue, light, *code_b)),
+            r.wrapping_add(entry(red, code_r)),
+            g.wrapping_add(entry(green, code_g)),
+            b.wrapping_add(entry(blue, code_b)),
         ]
     }
 
     #[inline(always)]
     fn steps(sum: [u16; 3], factors: [u16; 3]) -> [u32; 3] {
-        let ([r, g, b], [factor_r, factor_g, factor_b]) =
-            (sum.map(u32::from), factors.map(u32::from));
-        [
-            (r * factor_r) >> 21,
-            (g * factor_g) >> 21,
-            (b * factor_b) >> 21,
-        ]
+        let ([r, g, b], [factor_r, factor_g, factor_b]) = (sum, factors);
+        let step = |sum: u16, factor: u16| (u32::from(sum) * u32::from(factor)) >> 21;
+        [step(r, factor_r), step(g, factor_g), step(b, factor_b)]
     }
 }
 
 #[inline(always)]
-fn entry<V: Copy + Default, const L: usize>(table: &[[V; L]; 256], light: usize, code: u8) -> V {
+fn entry<V: Copy>(table: &[V; 256], code: u8) -> V {
     // A byte cannot leave a table of 256.
     #[allow(clippy::indexing_slicing)]
-    let lights = &table[usize::from(code)];
-    lights.get(light).copied().unwrap_or_default()
-}
-
-/// The weights of some terms, or of nothing.
-fn weights(terms: Option<&Terms>) -> [Weight; 3] {
-    terms.map_or([Weight::ZERO; 3], |terms| terms.map(|(weight, _)| weight))
+    let value = table[usize::from(code)];
+    value
 }
 
 /// Multiplies out one light of a mix.
 ///
 /// # Errors
 /// [`RelightError::Lights`] without such a light.
-pub fn fill_table<F: Form, const L: usize>(
+pub fn fill_table<F: Form>(
     atlas: &Atlas,
     mix: &FrameMix,
     light: u32,
-    table: &mut F::Table<L>,
+    table: &mut F::Table,
 ) -> Result<(), RelightError> {
-    let after = mix.terms(atlas, light, F::BITS)?;
-    F::fill(table, light as usize, None, &after);
+    let terms = mix.terms::<F::Known>(atlas, light, F::BITS)?;
+    F::fill(table, None, &terms);
     Ok(())
 }
 
-/// The pixels of all elements, from a table of all `K` lights; `L` is at least `K`.
+/// Sets the levels of one light, and multiplies out by how much it changes.
+///
+/// # Errors
+/// [`RelightError::Lights`] without such a light. Nothing has changed then.
+#[inline(never)]
+pub(super) fn fill_change<F: Form>(
+    atlas: &Atlas,
+    mix: &mut FrameMix,
+    (light, levels): (u32, [u16; 3]),
+    table: &mut F::Table,
+) -> Result<(), RelightError> {
+    let before = mix.terms::<F::Known>(atlas, light, F::BITS)?;
+    mix.set(light, levels);
+    let after = mix.terms::<F::Known>(atlas, light, F::BITS)?;
+    F::fill(table, Some(&before), &after);
+    Ok(())
+}
+
+/// The pixels of all elements, from a table of each of the `K` lights.
 ///
 /// # Errors
 /// Slices and runs that do not fit the atlas; [`RelightError::Code`] for another form.
-pub fn full<F: Form, const K: usize, const L: usize, T: Encode>(
+pub fn full<F: Form, const K: usize, T: Encode>(
     atlas: &Atlas,
-    table: &F::Table<L>,
+    tables: &[F::Table; K],
     finish: &Finish<T>,
     pixels: &mut [T::Pixel],
 ) -> Result<(), RelightError> {
     check_elements(atlas, pixels.len())?;
     let mut rows = rows::<F, K>(atlas)?;
-    if L < K {
-        return Err(RelightError::Table { needed: K });
-    }
     finish.by_run(pixels, |pixels, factors| {
         let own = rows.split_off(..pixels.len()).unwrap_or_default();
-        full_run::<F, K, L, T>(own, table, factors, finish.tone, pixels);
+        full_run::<F, K, T>(own, tables, factors, finish.tone, pixels);
     })
 }
 
 /// The pixels of a run. A function of its own has registers for all that it needs.
 #[inline(never)]
-fn full_run<F: Form, const K: usize, const L: usize, T: Encode>(
+fn full_run<F: Form, const K: usize, T: Encode>(
     rows: &[[F::Codes; K]],
-    table: &F::Table<L>,
+    tables: &[F::Table; K],
     factors: [u16; 3],
     tone: &T,
     pixels: &mut [T::Pixel],
 ) {
-    for (row, pixel) in rows.iter().zip(pixels) {
-        let mut sum = F::Sum::default();
-        for (light, codes) in row.iter().enumerate() {
-            sum = F::add(sum, table, light, codes);
-        }
-        *pixel = tone.encode(F::steps(sum, factors));
-        as_it_is();
+    let (groups, rest) = rows.as_chunks();
+    let (shown, rest_shown) = pixels.as_chunks_mut();
+    for (rows, pixels) in groups.iter().zip(shown) {
+        full_group::<F, K, GROUP, T>(rows, tables, factors, tone, pixels);
     }
+    for (row, pixel) in rest.iter().zip(rest_shown) {
+        let (row, pixel) = (array::from_ref(row), array::from_mut(pixel));
+        full_group::<F, K, 1, T>(row, tables, factors, tone, pixel);
+    }
+}
+
+/// The pixels of `N` elements, which look for a table together.
+#[inline(always)]
+fn full_group<F: Form, const K: usize, const N: usize, T: Encode>(
+    rows: &[[F::Codes; K]; N],
+    tables: &[F::Table; K],
+    factors: [u16; 3],
+    tone: &T,
+    pixels: &mut [T::Pixel; N],
+) {
+    let mut sums = [F::Sum::default(); N];
+    for (light, table) in tables.iter().enumerate() {
+        for (sum, row) in sums.iter_mut().zip(rows) {
+            if let Some(codes) = row.get(light) {
+                *sum = F::add(*sum, table, codes);
+            }
+        }
+    }
+    show_group::<F, N, T>(&sums, factors, tone, pixels);
 }
 
 /// The pixels of some sums.
 #[inline(never)]
 fn show<F: Form, T: Encode>(sums: &[F::Sum], factors: [u16; 3], tone: &T, pixels: &mut [T::Pixel]) {
-    for (pixel, sum) in pixels.iter_mut().zip(sums) {
+    let (groups, rest) = sums.as_chunks::<SHOWN>();
+    let (shown, rest_shown) = pixels.as_chunks_mut();
+    for (sums, pixels) in groups.iter().zip(shown) {
+        show_group::<F, SHOWN, T>(sums, factors, tone, pixels);
+    }
+    for (sum, pixel) in rest.iter().zip(rest_shown) {
+        show_group::<F, 1, T>(array::from_ref(sum), factors, tone, array::from_mut(pixel));
+    }
+}
+
+#[inline(always)]
+fn show_group<F: Form, const N: usize, T: Encode>(
+    sums: &[F::Sum; N],
+    factors: [u16; 3],
+    tone: &T,
+    pixels: &mut [T::Pixel; N],
+) {
+    for (sum, pixel) in sums.iter().zip(pixels) {
         *pixel = tone.encode(F::steps(*sum, factors));
         as_it_is();
     }
@@ -259,7 +344,7 @@ fn show<F: Form, T: Encode>(sums: &[F::Sum], factors: [u16; 3], tone: &T, pixels
 fn add_light<F: Form, const K: usize>(
     rows: &[[F::Codes; K]],
     light: usize,
-    table: &F::Table<1>,
+    table: &F::Table,
     sums: &mut [F::Sum],
 ) {
     if light >= K {
@@ -267,7 +352,7 @@ fn add_light<F: Form, const K: usize>(
     }
     for (sum, row) in sums.iter_mut().zip(rows) {
         if let Some(codes) = row.get(light) {
-            *sum = F::add(*sum, table, 0, codes);
+            *sum = F::add(*sum, table, codes);
         }
     }
 }
@@ -283,7 +368,7 @@ fn as_it_is() {
 pub struct Sums<'a, F: Form> {
     sums: &'a mut [F::Sum],
     /// Of one light at a time.
-    table: &'a mut F::Table<1>,
+    table: &'a mut F::Table,
 }
 
 impl<'a, F: Form> Sums<'a, F> {
@@ -295,15 +380,15 @@ impl<'a, F: Form> Sums<'a, F> {
         atlas: &Atlas,
         mix: &FrameMix,
         sums: &'a mut [F::Sum],
-        table: &'a mut F::Table<1>,
+        table: &'a mut F::Table,
     ) -> Result<Self, RelightError> {
         check_elements(atlas, sums.len())?;
         let rows = rows::<F, K>(atlas)?;
         sums.fill(F::Sum::default());
-        for light in 0..K {
-            let after = mix.terms(atlas, light as u32, F::BITS)?;
-            F::fill(table, 0, None, &after);
-            add_light::<F, K>(rows, light, table, sums);
+        // As many as `K`, but one copy of the loop is enough.
+        for light in 0..atlas.light_count() {
+            fill_table::<F>(atlas, mix, light, table)?;
+            add_light::<F, K>(rows, light as usize, table, sums);
         }
         Ok(Self { sums, table })
     }
@@ -353,11 +438,7 @@ impl<'a, F: Form> Sums<'a, F> {
         mix: &mut FrameMix,
         (light, levels): (u32, [u16; 3]),
     ) -> Result<(), RelightError> {
-        let before = mix.terms(atlas, light, F::BITS)?;
-        mix.set(light, levels);
-        let after = mix.terms(atlas, light, F::BITS)?;
-        F::fill(self.table, 0, Some(&before), &after);
-        Ok(())
+        fill_change::<F>(atlas, mix, (light, levels), self.table)
     }
 
     /// Corrects the sums for the light that was set, and shows them.
@@ -410,11 +491,13 @@ impl<'a> AnyTable<'a> {
         mix: &FrameMix,
         light: u32,
     ) -> Result<(), RelightError> {
-        let terms = mix.terms(atlas, light, [SINGLE; 3])?;
+        let terms = mix.terms::<AllCodes>(atlas, light, [SINGLE; 3])?;
         self.0.fill(light, |channel, code| {
             let term = terms.get(channel);
             // Below the full scale.
-            term.map_or(0, |(weight, values)| weight.of(values.of(code)) as u16)
+            term.map_or(0, |(weight, values)| {
+                weight.of(values.of::<AllCodes>(code)) as u16
+            })
         });
         Ok(())
     }

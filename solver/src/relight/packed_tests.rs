@@ -1,9 +1,10 @@
 extern crate std;
 use super::*;
-use crate::atlas::{Contents, LightEntry, Quantity, size, write};
+use crate::atlas::{AtlasError, Contents, LightEntry, Quantity, size, write};
 use crate::code::{Code, Curve, Scale};
 use crate::tone::{Exposure, Rgb565Table, Rgb888Table, radiance};
 use proptest::prelude::*;
+use std::format;
 use std::vec;
 use std::vec::Vec;
 
@@ -124,7 +125,7 @@ fn levels_strategy() -> impl Strategy<Value = Vec<[u16; 3]>> {
     proptest::collection::vec(levels, LIGHTS)
 }
 
-fn check<F: Form>(code: Code, levels: &[[u16; 3]], empty: impl Fn() -> (F::Table<8>, F::Table<1>))
+fn check<F: Form>(code: Code, levels: &[[u16; 3]])
 where
     F::Sum: PartialEq + std::fmt::Debug,
 {
@@ -135,14 +136,14 @@ where
     let mut mix = FrameMix::new(&atlas, &[Rgb::WHITE; LIGHTS], &mut room).unwrap();
     let finish = Finish::new(&atlas, &mix, &RUNS, exposure.factor(), &TONE).unwrap();
     let fill = |mix: &FrameMix| {
-        let (mut table, _) = empty();
-        for light in 0..LIGHTS as u32 {
-            fill_table::<F, 8>(&atlas, mix, light, &mut table).unwrap();
+        let mut tables = [F::EMPTY; LIGHTS];
+        for (light, table) in (0..).zip(&mut tables) {
+            fill_table::<F>(&atlas, mix, light, table).unwrap();
         }
-        table
+        tables
     };
     let mut black = vec![7; ELEMENTS as usize];
-    full::<F, LIGHTS, 8, _>(&atlas, &fill(&mix), &finish, &mut black).unwrap();
+    full::<F, LIGHTS, _>(&atlas, &fill(&mix), &finish, &mut black).unwrap();
     assert!(black.iter().all(|pixel| *pixel == 0), "all lights are off");
 
     for (light, levels) in (0..).zip(levels) {
@@ -150,11 +151,11 @@ where
     }
     let irradiance = in_floats(&atlas, levels);
     let mut pixels = vec![0; ELEMENTS as usize];
-    full::<F, LIGHTS, 8, _>(&atlas, &fill(&mix), &finish, &mut pixels).unwrap();
+    full::<F, LIGHTS, _>(&atlas, &fill(&mix), &finish, &mut pixels).unwrap();
     assert_close(&pixels, &irradiance, exposure);
 
     // The sums of a change are those of a full frame, and undoing it restores them.
-    let (mut sums, mut own) = (vec![F::Sum::default(); ELEMENTS as usize], empty().1);
+    let (mut sums, mut own) = (vec![F::Sum::default(); ELEMENTS as usize], F::EMPTY);
     let mut kept = Sums::<F>::new::<LIGHTS>(&atlas, &mix, &mut sums, &mut own).unwrap();
     let mut changed = vec![0; ELEMENTS as usize];
     kept.show(&finish, &mut changed).unwrap();
@@ -163,7 +164,7 @@ where
     kept.change::<LIGHTS, _>(&atlas, &mut mix, (2, to), &finish, &mut changed)
         .unwrap();
     let mut full_again = vec![0; ELEMENTS as usize];
-    full::<F, LIGHTS, 8, _>(&atlas, &fill(&mix), &finish, &mut full_again).unwrap();
+    full::<F, LIGHTS, _>(&atlas, &fill(&mix), &finish, &mut full_again).unwrap();
     assert_eq!(changed, full_again);
     kept.change::<LIGHTS, _>(&atlas, &mut mix, (2, levels[2]), &finish, &mut changed)
         .unwrap();
@@ -171,7 +172,7 @@ where
 
     let finish = Finish::new(&atlas, &mix, &RUNS, exposure.factor(), &BYTES).unwrap();
     let mut triples = vec![[0; 3]; ELEMENTS as usize];
-    full::<F, LIGHTS, 8, _>(&atlas, &fill(&mix), &finish, &mut triples).unwrap();
+    full::<F, LIGHTS, _>(&atlas, &fill(&mix), &finish, &mut triples).unwrap();
     for (triple, pixel) in triples.iter().zip(&pixels) {
         let [r, g, b] = triple.map(u16::from);
         let step = |value: u16, steps: u16| (value * steps + 127) / 255;
@@ -196,13 +197,13 @@ where
 proptest! {
     #[test]
     fn luminance_frames_are_within_a_step_of_the_float_ones(levels in levels_strategy()) {
-        check::<Lum>(Code::Lum8, &levels, || ([[0; 8]; 256], [[0; 1]; 256]));
+        check::<Lum>(Code::Lum8, &levels);
     }
 
     #[test]
     fn colour_frames_are_within_a_step_of_the_float_ones(levels in levels_strategy()) {
-        check::<Colour>(Code::Display8, &levels, || ([[[0; 8]; 256]; 3], [[[0; 1]; 256]; 3]));
-        check::<Colour>(Code::Exp8s, &levels, || ([[[0; 8]; 256]; 3], [[[0; 1]; 256]; 3]));
+        check::<Colour>(Code::Display8, &levels);
+        check::<Colour>(Code::Exp8s, &levels);
     }
 }
 
@@ -224,16 +225,44 @@ fn what_does_not_fit_is_refused() {
     }
     let finish = Finish::new(&atlas, &mix, &RUNS, 0.1, &TONE).unwrap();
     let mut pixels = [0; ELEMENTS as usize];
-    let tables = [[[0_u16; 8]; 256]; 3];
-    let refused = full::<Colour, LIGHTS, 8, _>(&atlas, &tables, &finish, &mut pixels);
+    let tables = [Colour::EMPTY; LIGHTS];
+    let refused = full::<Colour, LIGHTS, _>(&atlas, &tables, &finish, &mut pixels);
     assert_eq!(refused, Err(RelightError::Code));
-    let tables = [[0; 8]; 256];
-    let refused = full::<Lum, { LIGHTS - 1 }, 8, _>(&atlas, &tables, &finish, &mut pixels);
+    let tables = [Lum::EMPTY; LIGHTS];
+    let [few @ .., _] = &tables;
+    let refused = full::<Lum, { LIGHTS - 1 }, _>(&atlas, few, &finish, &mut pixels);
     assert_eq!(refused, Err(RelightError::Lights { expected: 6 }));
-    let refused = full::<Lum, LIGHTS, 8, _>(&atlas, &tables, &finish, &mut pixels[1..]);
+    let refused = full::<Lum, LIGHTS, _>(&atlas, &tables, &finish, &mut pixels[1..]);
     assert_eq!(refused, Err(elements));
-    let refused = full::<Lum, LIGHTS, 2, _>(&atlas, &[[0; 2]; 256], &finish, &mut pixels);
-    assert_eq!(refused, Err(RelightError::Table { needed: 6 }));
     assert_eq!(mix.levels(5), Some([0; 3]));
     assert_eq!(mix.levels(6), None);
+}
+
+#[test]
+fn who_knows_only_exponential_codes_gets_the_same_from_them() {
+    for code in [Code::Exp8, Code::Exp8s, Code::Lum8] {
+        let bytes = atlas_bytes(code);
+        let (all, few) = (Atlas::parse(&bytes), Atlas::parse_exponential(&bytes));
+        let (all, few) = (all.unwrap(), few.unwrap());
+        assert_eq!(all.codes(), few.codes());
+        let full: Vec<Rgb> = (0..LIGHTS).map(|l| Rgb::splat(0.3 + l as f32)).collect();
+        let mut rooms = [[FrameLight::EMPTY; LIGHTS]; 2];
+        let [of_all, of_few] = &mut rooms;
+        let of_all = FrameMix::new(&all, &full, of_all).unwrap();
+        let of_few = FrameMix::exponential(&few, &full, of_few).unwrap();
+        assert_eq!(format!("{of_all:?}"), format!("{of_few:?}"), "{code:?}");
+
+        for at in 0..bytes.len() {
+            let mut damaged = bytes.clone();
+            damaged[at] ^= 0x10;
+            assert!(Atlas::parse_exponential(&damaged).is_err(), "byte {at}");
+        }
+    }
+    let bytes = atlas_bytes(Code::Display8);
+    let refused = Atlas::parse_exponential(&bytes).err();
+    assert_eq!(refused, Some(AtlasError::Illegal("code")));
+    let atlas = Atlas::parse(&bytes).unwrap();
+    let mut room = [FrameLight::EMPTY; LIGHTS];
+    let refused = FrameMix::exponential(&atlas, &[Rgb::WHITE; LIGHTS], &mut room).err();
+    assert_eq!(refused, Some(RelightError::Code));
 }

@@ -60,11 +60,22 @@ impl Wide {
 
     /// The quotient of two; 0 for a divisor of 0.
     pub(super) const fn over(self, other: Self) -> Self {
-        let quotient = (self.0.mantissa as u64) << 32;
-        match quotient.checked_div(other.0.mantissa as u64) {
-            Some(quotient) => Self::new(quotient, self.0.exponent - other.0.exponent - 32),
-            None => Self::ZERO,
+        if other.0.mantissa == 0 {
+            return Self::ZERO;
         }
+        // Digit by digit: a division of 64 bits is more code than all else of a mix on the smallest cores.
+        let divisor = other.0.mantissa as u64;
+        let (mut quotient, mut rest, mut digit) = (0, self.0.mantissa as u64, 0);
+        while digit <= 32 {
+            quotient *= 2;
+            if rest >= divisor {
+                rest -= divisor;
+                quotient += 1;
+            }
+            rest *= 2;
+            digit += 1;
+        }
+        Self::new(quotient, self.0.exponent - other.0.exponent - 32)
     }
 
     /// The value times a power of two.

@@ -1,6 +1,6 @@
 //! Of surfaces that lie in one plane on top of each other, only one can be seen from a side.
 //!
-//! On top is the one that emits to that side, or else the later one. A surface of one side is nothing
+//! On top is the one that emits to that side, or else the later one. A surface of one side is below all others
 //! from behind. Surfaces cover each other where they share more than a hundred thousandth of the smaller one: what
 //! touches in an edge does not.
 
@@ -20,8 +20,9 @@ pub fn covers(top: (u32, &Surface), bottom: (u32, &Surface), facing: Vec3) -> bo
     let rank = |(number, surface): (u32, &Surface)| {
         (surface.emission().is_some() && fronts(surface), number)
     };
-    rank(top) > rank(bottom)
-        && (fronts(top.1) || top.1.is_two_sided())
+    let has_side = |surface: &Surface| fronts(surface) || surface.is_two_sided();
+    has_side(top.1)
+        && (rank(top) > rank(bottom) || !has_side(bottom.1))
         && overlap(top.1.polygon(), bottom.1.polygon())
 }
 
@@ -74,6 +75,7 @@ mod tests {
             "a rug from below"
         );
         assert!(covers((1, &rug.two_sided()), (0, &floor), -Vec3::Z));
+        assert!(covers((0, &floor.two_sided()), (1, &rug), -Vec3::Z));
         let emission = Emission {
             light: 0,
             share: Rgb::WHITE,

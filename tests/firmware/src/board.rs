@@ -19,6 +19,7 @@ pub fn exit(status: u32) -> ! {
 }
 
 /// Prints `name value`.
+#[inline(never)]
 pub fn say(name: &core::ffi::CStr, value: u32) {
     let mut digits = *b" 0x00000000\n\0";
     let places = digits.iter_mut().skip(3).take(8);
@@ -68,9 +69,9 @@ pub fn ticks() -> u32 {
     u32::MAX - read(0x4000_0004)
 }
 
-/// Ticks in a million instructions of 1.024 us: 25 MHz.
+/// Instructions of 1.024 us in a tick of 25 MHz.
 #[cfg(not(small))]
-const TICKS: u64 = 25_600_000;
+const PER_TICK: (u64, u32) = (5, 7);
 
 /// Starts the slow timer.
 #[cfg(not(small))]
@@ -109,13 +110,16 @@ pub fn ticks() -> u32 {
     read(0x4000_8540)
 }
 
-/// Ticks in a million instructions of 1.024 us: 16 MHz.
+/// Instructions of 1.024 us in a tick of 16 MHz.
 #[cfg(small)]
-const TICKS: u64 = 16_384_000;
+const PER_TICK: (u64, u32) = (125, 11);
 
 /// Instructions in so many ticks.
+#[inline(never)]
 pub fn instructions(ticks: u32) -> u32 {
-    (u64::from(ticks) * 1_000_000 / TICKS) as u32
+    // A factor over a power of two.
+    let (factor, shift) = PER_TICK;
+    (u64::from(ticks) * factor >> shift) as u32
 }
 
 fn write(register: usize, value: u32) {

@@ -5,7 +5,7 @@ use core::hint::black_box;
 use relume::atlas::Atlas;
 use relume::color::Rgb;
 use relume::relight::{
-    AnyTable, Finish, Form, FrameLight, FrameMix, Run, Sums, fill_table, full, full_any,
+    AnyTable, Colour, Finish, Form, FrameLight, FrameMix, Run, Sums, fill_table, full, full_any,
 };
 use relume::tone::Rgb565Table;
 
@@ -52,7 +52,33 @@ fn volatile<const K: usize>(levels: &[[u16; 3]; K]) -> [[u16; 3]; K] {
     unsafe { core::ptr::read_volatile(levels) }
 }
 
-fn set_all<const K: usize>(mix: &mut FrameMix, levels: &[[u16; 3]; K]) {
+/// What comes before the first frame.
+struct Ready {
+    atlas: Atlas<'static>,
+    mix: FrameMix<'static>,
+    finish: Finish<'static, Rgb565Table>,
+}
+
+/// With a stack of its own, which is free again afterwards.
+#[inline(never)]
+fn parsed<F: Form>(bytes: &'static [u8]) -> Atlas<'static> {
+    must(F::parse(bytes))
+}
+
+/// Reads an atlas for the kernels of a form.
+#[inline(never)]
+fn ready<F: Form, const K: usize>(
+    input: &'static Input<K>,
+    room: &'static mut [FrameLight; K],
+) -> Ready {
+    let atlas = parsed::<F>(input.atlas);
+    let mix = must(F::mix(&atlas, &input.full, room));
+    let finish = must(Finish::new(&atlas, &mix, input.runs, input.exposure, &TONE));
+    Ready { atlas, mix, finish }
+}
+
+#[inline(never)]
+fn set_all(mix: &mut FrameMix, levels: &[[u16; 3]]) {
     for (light, levels) in (0..).zip(levels) {
         mix.set(light, *levels);
     }
@@ -66,6 +92,7 @@ fn one_index(pixels: &[u16], at: u32) {
     let _ = (pixels, at);
 }
 
+#[inline(never)]
 fn report(per_frame: u32, warm: u32, hash: u32) -> ! {
     say(c"per_frame", per_frame);
     say(c"per_frame_warm", warm);
@@ -75,41 +102,28 @@ fn report(per_frame: u32, warm: u32, hash: u32) -> ! {
 }
 
 /// Frames from the tables of all lights.
-pub fn run_full<F: Form, const K: usize, const L: usize>(
+pub fn run_full<F: Form, const K: usize>(
     input: &'static Input<K>,
-    table: &'static mut F::Table<L>,
+    room: &'static mut [FrameLight; K],
+    tables: &'static mut [F::Table; K],
     pixels: &'static mut [u16],
 ) -> ! {
     paint_stack();
     let [first, second] = input.levels.each_ref().map(volatile);
-    let atlas = must(Atlas::parse_codes(input.atlas));
-    let mut room = [FrameLight::EMPTY; K];
-    let mut mix = must(FrameMix::new(&atlas, &input.full, &mut room));
-    let finish = must(Finish::new(&atlas, &mix, input.runs, input.exposure, &TONE));
-    let mut frame = |levels: &[[u16; 3]; K], table: &mut F::Table<L>, pixels: &mut [u16]| {
-        set_all(&mut mix, levels);
-        for light in 0..K as u32 {
-            must(fill_table::<F, L>(&atlas, &mix, light, table));
+    let mut ready = ready::<F, K>(input, room);
+    let Ready { atlas, mix, finish } = &mut ready;
+    let mut frame = |levels: &[[u16; 3]; K], tables: &mut [F::Table; K], pixels: &mut [u16]| {
+        set_all(mix, levels);
+        for (light, table) in (0..).zip(tables.iter_mut()) {
+            must(fill_table::<F>(atlas, mix, light, table));
         }
-        must(full::<F, K, L, _>(
-            &atlas,
-            black_box(table),
-            &finish,
-            pixels,
-        ));
+        must(full::<F, K, _>(atlas, black_box(tables), finish, pixels));
     };
-    frame(&first, table, pixels);
-    let cold = count(|| frame(&second, table, pixels));
+    frame(&first, tables, pixels);
+    let cold = count(|| frame(&second, tables, pixels));
     let cold_hash = hash(pixels);
     pixels.fill(0);
-    let warm = count(|| {
-        must(full::<F, K, L, _>(
-            &atlas,
-            black_box(table),
-            &finish,
-            pixels,
-        ))
-    });
+    let warm = count(|| must(full::<F, K, _>(atlas, black_box(tables), finish, pixels)));
     same(cold_hash, hash(pixels));
     report(cold, warm, cold_hash)
 }
@@ -117,20 +131,19 @@ pub fn run_full<F: Form, const K: usize, const L: usize>(
 /// Frames whose tables do not fit into memory together.
 pub fn run_sums<F: Form, const K: usize>(
     input: &'static Input<K>,
+    room: &'static mut [FrameLight; K],
     sums: &'static mut [F::Sum],
-    table: &'static mut F::Table<1>,
+    table: &'static mut F::Table,
     pixels: &'static mut [u16],
 ) -> ! {
     paint_stack();
     let [_, second] = input.levels.each_ref().map(volatile);
-    let atlas = must(Atlas::parse_codes(input.atlas));
-    let mut room = [FrameLight::EMPTY; K];
-    let mut mix = must(FrameMix::new(&atlas, &input.full, &mut room));
-    let finish = must(Finish::new(&atlas, &mix, input.runs, input.exposure, &TONE));
+    let mut ready = ready::<F, K>(input, room);
+    let Ready { atlas, mix, finish } = &mut ready;
     let cold = count(|| {
-        set_all(&mut mix, &second);
-        let sums = must(Sums::<F>::new::<K>(&atlas, &mix, sums, table));
-        must(sums.show(&finish, pixels));
+        set_all(mix, &second);
+        let sums = must(Sums::<F>::new::<K>(atlas, mix, sums, table));
+        must(sums.show(finish, pixels));
     });
     report(cold, cold, hash(pixels))
 }
@@ -138,8 +151,9 @@ pub fn run_sums<F: Form, const K: usize>(
 /// One changed light, and back.
 pub fn run_change<F: Form, const K: usize>(
     input: &'static Input<K>,
+    room: &'static mut [FrameLight; K],
     sums: &'static mut [F::Sum],
-    table: &'static mut F::Table<1>,
+    table: &'static mut F::Table,
     pixels: &'static mut [u16],
 ) -> ! {
     paint_stack();
@@ -148,53 +162,48 @@ pub fn run_change<F: Form, const K: usize>(
     let (Some(before), Some(after)) = (first.get(light), second.get(light)) else {
         exit(1)
     };
-    let atlas = must(Atlas::parse_codes(input.atlas));
-    let mut room = [FrameLight::EMPTY; K];
-    let mut mix = must(FrameMix::new(&atlas, &input.full, &mut room));
-    let finish = must(Finish::new(&atlas, &mix, input.runs, input.exposure, &TONE));
-    set_all(&mut mix, &first);
-    let mut kept = must(Sums::<F>::new::<K>(&atlas, &mix, sums, table));
-    must(kept.show(&finish, pixels));
+    let mut ready = ready::<F, K>(input, room);
+    let Ready { atlas, mix, finish } = &mut ready;
+    set_all(mix, &first);
+    let mut kept = must(Sums::<F>::new::<K>(atlas, mix, sums, table));
+    must(kept.show(finish, pixels));
     let unchanged = hash(pixels);
     let cold = count(|| {
-        must(kept.change::<K, _>(&atlas, &mut mix, (CHANGED, *after), &finish, pixels));
+        must(kept.change::<K, _>(atlas, mix, (CHANGED, *after), finish, pixels));
     });
     let changed = hash(pixels);
     one_index(pixels, changed);
+    must(kept.set(atlas, mix, (CHANGED, *before)));
     // What is left when the table is there already.
-    let table = count(|| {
-        must(kept.set(&atlas, &mut mix, (CHANGED, *before)));
-    });
-    must(kept.apply::<K, _>(&atlas, CHANGED, &finish, pixels));
+    let warm = count(|| must(kept.apply::<K, _>(atlas, CHANGED, finish, pixels)));
     same(unchanged, hash(pixels));
-    report(cold, cold - table, changed)
+    report(cold, warm, changed)
 }
 
 /// Frames from codes of any kind.
 pub fn run_any<const K: usize>(
     input: &'static Input<K>,
+    room: &'static mut [FrameLight; K],
     values: &'static mut [u16],
     sums: &'static mut [[u16; 3]],
     pixels: &'static mut [u16],
 ) -> ! {
     paint_stack();
     let [first, second] = input.levels.each_ref().map(volatile);
-    let atlas = must(Atlas::parse_codes(input.atlas));
-    let mut room = [FrameLight::EMPTY; K];
-    let mut mix = must(FrameMix::new(&atlas, &input.full, &mut room));
-    let finish = must(Finish::new(&atlas, &mix, input.runs, input.exposure, &TONE));
-    set_all(&mut mix, &first);
-    let mut table = must(AnyTable::new(&atlas, &mix, values));
+    let mut ready = ready::<Colour, K>(input, room);
+    let Ready { atlas, mix, finish } = &mut ready;
+    set_all(mix, &first);
+    let mut table = must(AnyTable::new(atlas, mix, values));
     let cold = count(|| {
-        set_all(&mut mix, &second);
-        for light in 0..K as u32 {
-            must(table.update(&atlas, &mix, light));
+        set_all(mix, &second);
+        for light in 0..atlas.light_count() {
+            must(table.update(atlas, mix, light));
         }
-        must(full_any(&atlas, &table, &finish, sums, pixels));
+        must(full_any(atlas, &table, finish, sums, pixels));
     });
     let cold_hash = hash(pixels);
     pixels.fill(0);
-    let warm = count(|| must(full_any(&atlas, &table, &finish, sums, pixels)));
+    let warm = count(|| must(full_any(atlas, &table, finish, sums, pixels)));
     same(cold_hash, hash(pixels));
     report(cold, warm, cold_hash)
 }

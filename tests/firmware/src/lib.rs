@@ -14,6 +14,8 @@ pub mod kernels;
 #[cfg(target_os = "none")]
 mod measure;
 
+#[cfg(feature = "draw")]
+pub mod drawn;
 pub mod room;
 
 #[cfg(target_os = "none")]

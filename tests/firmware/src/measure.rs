@@ -30,6 +30,7 @@ pub fn long_count(f: impl FnOnce()) -> u32 {
 }
 
 /// FNV-1a, 32 bits, of the bytes of pixels, low byte first.
+#[inline(never)]
 pub fn hash(pixels: &[u16]) -> u32 {
     hash_bytes(pixels.iter().flat_map(|pixel| pixel.to_le_bytes()))
 }

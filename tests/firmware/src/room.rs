@@ -72,24 +72,97 @@ fn surface(index: u32, polygon: &Polygon) -> Option<Surface> {
     }
 }
 
+/// All surfaces; `None` where one is not legal.
+fn surfaces<const N: usize>(polygons: &[Polygon; N]) -> Option<[Surface; N]> {
+    let mut numbered = (0..).zip(polygons);
+    let found: [Option<Surface>; N] = array::from_fn(|_| {
+        let (index, polygon) = numbered.next()?;
+        surface(index, polygon)
+    });
+    let first = (*found.first()?)?;
+    let is_whole = found.iter().all(Option::is_some);
+    is_whole.then(|| found.map(|surface| surface.unwrap_or(first)))
+}
+
+/// Polygons of the room of the moving light: its walls, five boxes, a lamp.
+pub const MOVING_POLYGONS: usize = 37;
+const MOVING_PATCHES: usize = 128;
+const MOVING_ELEMENTS: usize = 1920;
+
+/// What direct light needs.
+pub struct DirectMemory {
+    mesh: MeshStorage<MOVING_POLYGONS, MOVING_PATCHES, MOVING_ELEMENTS>,
+    row: [f32; MOVING_ELEMENTS],
+}
+
+impl DirectMemory {
+    /// Empty memory.
+    #[allow(clippy::new_without_default, reason = "it is for statics")]
+    pub const fn new() -> Self {
+        Self {
+            mesh: MeshStorage::new(),
+            row: [0.0; MOVING_ELEMENTS],
+        }
+    }
+}
+
+/// Direct light with shadows of a lamp in all elements of a room.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Direct {
+    /// FNV-1a of the bits of all values.
+    pub hash: u32,
+    /// Elements that it reaches.
+    pub lit: u32,
+    /// What the counter said.
+    pub count: u32,
+}
+
+/// The direct light of the last polygon, a lamp: its row of form factors, which `count` counts. `None` when something does not fit.
+pub fn direct(
+    polygons: &[Polygon; MOVING_POLYGONS],
+    memory: &mut DirectMemory,
+    count: impl FnOnce(&mut dyn FnMut()) -> u32,
+) -> Option<Direct> {
+    let surfaces = surfaces(polygons)?;
+    let scene = Scene::new(&surfaces, &[], 1).ok()?;
+    let spacing = Spacing {
+        patch: 1.001,
+        element: 0.2501,
+    };
+    let fronts = |_, side| side == Side::Front;
+    subdivide(&scene, spacing, fronts, &mut memory.mesh).ok()?;
+    let mesh = memory.mesh.mesh();
+    if mesh.elements.len() != MOVING_ELEMENTS {
+        return None;
+    }
+    let mut found = bodies(&surfaces);
+    let mut next = || found.next();
+    // The room and its boxes.
+    let bodies = [next()?, next()?, next()?, next()?, next()?, next()?];
+    let occluders = OccludersAndBodies {
+        surfaces: &surfaces,
+        bodies: &bodies,
+    };
+    let lamp = mesh.patches.len().checked_sub(1)? as u32;
+    let row = &mut memory.row;
+    let count = count(&mut || form_factor::row(&mesh, lamp, &occluders, row));
+    let bytes = memory.row.iter().flat_map(|value| value.to_le_bytes());
+    Some(Direct {
+        hash: bytes.fold(0x811c_9dc5, |hash, byte| {
+            (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
+        }),
+        lit: memory.row.iter().filter(|value| **value > 0.0).count() as u32,
+        count,
+    })
+}
+
 /// Bakes until less than a hundredth of any light's power is unshot, and packs into `flash`; `None` when something does not fit.
 pub fn bake(
     polygons: &[Polygon; POLYGONS],
     memory: &mut Memory,
     flash: &mut [u8],
 ) -> Option<Baked> {
-    let surfaces: [Option<Surface>; POLYGONS] = {
-        let mut numbered = (0..).zip(polygons);
-        array::from_fn(|_| {
-            numbered
-                .next()
-                .and_then(|(index, polygon)| surface(index, polygon))
-        })
-    };
-    let [Some(first), ..] = surfaces else {
-        return None;
-    };
-    let surfaces = surfaces.map(|surface| surface.unwrap_or(first));
+    let surfaces = surfaces(polygons)?;
     let scene = Scene::new(&surfaces, &[], LIGHTS as u32).ok()?;
     let spacing = Spacing {
         patch: 1.0,

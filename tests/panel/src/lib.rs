@@ -37,7 +37,7 @@ pub use lamp::{LAMPS, Lamp, ROOMS};
 pub use layout::{PICTURE, SCREEN, slider};
 pub use picture::{BRIGHTEST, EXPOSURE};
 
-use picture::{PIXELS, Picture, Table};
+use picture::{DARK, PIXELS, Picture, Tables};
 
 /// Lights of the atlas: the lamps, and the dusk outside, which nobody can switch.
 pub const LIGHTS: usize = LAMPS + 1;
@@ -46,7 +46,7 @@ pub const LIGHTS: usize = LAMPS + 1;
 #[derive(Debug)]
 pub struct Memory {
     lights: [FrameLight; LIGHTS],
-    table: Table,
+    tables: Tables,
     pixels: [u16; PIXELS],
 }
 
@@ -56,7 +56,7 @@ impl Memory {
     pub const fn new() -> Self {
         Self {
             lights: [FrameLight::EMPTY; LIGHTS],
-            table: [[[0; 8]; 256]; 3],
+            tables: DARK,
             pixels: [0; PIXELS],
         }
     }
@@ -92,10 +92,10 @@ impl<'a> Panel<'a> {
     pub fn new(atlas: Atlas<'a>, memory: &'a mut Memory) -> Result<Self, RelightError> {
         let Memory {
             lights,
-            table,
+            tables,
             pixels,
         } = memory;
-        let mut picture = Picture::new(atlas, lights, table, pixels)?;
+        let mut picture = Picture::new(atlas, lights, tables, pixels)?;
         for lamp in 0..LAMPS {
             picture.set(lamp as u32, 0)?;
         }

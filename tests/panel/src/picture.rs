@@ -29,15 +29,18 @@ static RUNS: [Run; 1] = [Run {
     reflectance: [u16::MAX; 3],
 }];
 
-/// All lights' products; a power of two suits the addressing.
-pub(crate) type Table = <Colour as Form>::Table<8>;
+/// What the codes of every light contribute.
+pub(crate) type Tables = [<Colour as Form>::Table; LIGHTS];
 
-/// A mix, its table, and the pixels that it gave.
+/// Nothing.
+pub(crate) const DARK: Tables = [Colour::EMPTY; LIGHTS];
+
+/// A mix, its tables, and the pixels that it gave.
 #[derive(Debug)]
 pub(crate) struct Picture<'a> {
     atlas: Atlas<'a>,
     mix: FrameMix<'a>,
-    table: &'a mut Table,
+    tables: &'a mut Tables,
     pixels: &'a mut [u16; PIXELS],
 }
 
@@ -46,7 +49,7 @@ impl<'a> Picture<'a> {
     pub(crate) fn new(
         atlas: Atlas<'a>,
         lights: &'a mut [FrameLight; LIGHTS],
-        table: &'a mut Table,
+        tables: &'a mut Tables,
         pixels: &'a mut [u16; PIXELS],
     ) -> Result<Self, RelightError> {
         let mut full = [Rgb::BLACK; LIGHTS];
@@ -56,7 +59,7 @@ impl<'a> Picture<'a> {
         Ok(Self {
             mix: FrameMix::new(&atlas, &full, lights)?,
             atlas,
-            table,
+            tables,
             pixels,
         })
     }
@@ -64,14 +67,17 @@ impl<'a> Picture<'a> {
     /// Sets a light to a share of its nominal emission, in 2^-16.
     pub(crate) fn set(&mut self, light: u32, level: u16) -> Result<(), RelightError> {
         self.mix.set(light, [level; 3]);
-        fill_table::<Colour, 8>(&self.atlas, &self.mix, light, self.table)
+        let table = self.tables.get_mut(light as usize);
+        let expected = LIGHTS as u32;
+        let table = table.ok_or(RelightError::Lights { expected })?;
+        fill_table::<Colour>(&self.atlas, &self.mix, light, table)
     }
 
     /// Makes the pixels.
     pub(crate) fn relight(&mut self) -> Result<(), RelightError> {
         // The kernel shows `E / pi`.
         let finish = Finish::new(&self.atlas, &self.mix, &RUNS, EXPOSURE * PI, &TONE)?;
-        full::<Colour, LIGHTS, 8, _>(&self.atlas, self.table, &finish, self.pixels)
+        full::<Colour, LIGHTS, _>(&self.atlas, self.tables, &finish, self.pixels)
     }
 
     /// The pixels as they were made last, row by row.

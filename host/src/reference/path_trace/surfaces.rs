@@ -8,7 +8,8 @@
 //! was itself rounded by as much again. Within their sum, rounded up to `2^-22 m`, nobody can say
 //! on which side of a surface a point lies. Rays therefore start that *margin* in front of their
 //! surface and end that margin before their target: a surface never hides its own points or those
-//! of one that coincides with it. What gets lost is the light of gaps thinner than the margin.
+//! of one that coincides with it. What gets lost is the light of gaps thinner than the margin. Of surfaces that
+//! a ray meets within the margin of each other it sees the one that emits towards it, else the last one that has a side there.
 //!
 //! # References
 //! * J. Amanatides, K. Choi, *Ray tracing triangular meshes*, 1997 (Western Computer Graphics
@@ -88,6 +89,8 @@ pub(super) struct Surfaces {
     pub(super) triangles: Vec<Triangle>,
     nodes: Vec<Node>,
     margin: f64,
+    /// By surface: which of several in one place is seen from the front, and from the back.
+    ranks: Vec<[usize; 2]>,
 }
 
 /// A box of the tree. Nodes stand in depth-first order.
@@ -116,6 +119,16 @@ impl Surfaces {
             triangles,
             nodes: Vec::new(),
             margin: largest * MARGIN,
+            ranks: (1..)
+                .zip(surfaces)
+                .map(|(number, surface)| {
+                    let emitting = usize::from(surface.emission().is_some()) * surfaces.len();
+                    [
+                        number + emitting,
+                        usize::from(surface.is_two_sided()) * number,
+                    ]
+                })
+                .collect(),
         };
         all.divide(0..all.triangles.len());
         all
@@ -189,14 +202,24 @@ impl Surfaces {
         point + normal * self.margin
     }
 
-    /// The first surface that a ray meets.
+    /// The first surface that a ray of this direction, a unit vector, meets.
     pub(super) fn first_hit(&self, origin: DVec3, direction: DVec3) -> Option<Hit> {
-        let mut nearest = None;
+        let rank = |hit: &Hit| {
+            let triangle = &self.triangles[hit.triangle];
+            let is_back = triangle.normal.dot(direction) > 0.0;
+            self.ranks[triangle.surface][usize::from(is_back)]
+        };
+        let mut first: Option<Hit> = None;
+        let mut nearest = f64::INFINITY;
         self.visit(origin, direction, f64::INFINITY, |hit| {
-            nearest = Some(hit);
-            hit.distance
+            let is_nearer = hit.distance < nearest - self.margin;
+            if is_nearer || first.is_none_or(|other| rank(&hit) > rank(&other)) {
+                first = Some(hit);
+            }
+            nearest = nearest.min(hit.distance);
+            nearest + self.margin
         });
-        nearest
+        first
     }
 
     /// True when nothing stands on the way from `from` to a margin before `to`.

@@ -6,16 +6,25 @@
 use cortex_m_rt::entry;
 use firmware::Lent;
 use firmware::kernels::{Input, run_sums};
-use relume::relight::Lum;
+use relume::relight::{Form, FrameLight, Lum};
 
 include!(concat!(env!("FIRMWARE_DATA"), "/lum_1920x30.rs"));
 
+static ROOM: Lent<[FrameLight; 30]> = Lent::new([FrameLight::EMPTY; 30]);
 static SUMS: Lent<[u32; 1920]> = Lent::new([0; 1920]);
-static TABLE: Lent<[[u32; 1]; 256]> = Lent::new([[0; 1]; 256]);
+static TABLE: Lent<<Lum as Form>::Table> = Lent::new(Lum::EMPTY);
 static PIXELS: Lent<[u16; 1920]> = Lent::new([0; 1920]);
 
 #[entry]
 fn main() -> ! {
     // SAFETY: once.
-    unsafe { run_sums::<Lum, 30>(&INPUT, SUMS.lend(), TABLE.lend(), PIXELS.lend()) }
+    unsafe {
+        run_sums::<Lum, 30>(
+            &INPUT,
+            ROOM.lend(),
+            SUMS.lend(),
+            TABLE.lend(),
+            PIXELS.lend(),
+        )
+    }
 }

@@ -6,16 +6,25 @@
 use cortex_m_rt::entry;
 use firmware::Lent;
 use firmware::kernels::{Input, run_change};
-use relume::relight::Lum;
+use relume::relight::{Form, FrameLight, Lum};
 
 include!(concat!(env!("FIRMWARE_DATA"), "/lum_960x8.rs"));
 
+static ROOM: Lent<[FrameLight; 8]> = Lent::new([FrameLight::EMPTY; 8]);
 static SUMS: Lent<[u32; 960]> = Lent::new([0; 960]);
-static TABLE: Lent<[[u32; 1]; 256]> = Lent::new([[0; 1]; 256]);
+static TABLE: Lent<<Lum as Form>::Table> = Lent::new(Lum::EMPTY);
 static PIXELS: Lent<[u16; 960]> = Lent::new([0; 960]);
 
 #[entry]
 fn main() -> ! {
     // SAFETY: once.
-    unsafe { run_change::<Lum, 8>(&INPUT, SUMS.lend(), TABLE.lend(), PIXELS.lend()) }
+    unsafe {
+        run_change::<Lum, 8>(
+            &INPUT,
+            ROOM.lend(),
+            SUMS.lend(),
+            TABLE.lend(),
+            PIXELS.lend(),
+        )
+    }
 }

@@ -6,16 +6,25 @@
 use cortex_m_rt::entry;
 use firmware::Lent;
 use firmware::kernels::{Input, run_change};
-use relume::relight::Colour;
+use relume::relight::{Colour, Form, FrameLight};
 
 include!(concat!(env!("FIRMWARE_DATA"), "/rgb_960x8.rs"));
 
+static ROOM: Lent<[FrameLight; 8]> = Lent::new([FrameLight::EMPTY; 8]);
 static SUMS: Lent<[[u16; 3]; 960]> = Lent::new([[0; 3]; 960]);
-static TABLE: Lent<[[[u16; 1]; 256]; 3]> = Lent::new([[[0; 1]; 256]; 3]);
+static TABLE: Lent<<Colour as Form>::Table> = Lent::new(Colour::EMPTY);
 static PIXELS: Lent<[u16; 960]> = Lent::new([0; 960]);
 
 #[entry]
 fn main() -> ! {
     // SAFETY: once.
-    unsafe { run_change::<Colour, 8>(&INPUT, SUMS.lend(), TABLE.lend(), PIXELS.lend()) }
+    unsafe {
+        run_change::<Colour, 8>(
+            &INPUT,
+            ROOM.lend(),
+            SUMS.lend(),
+            TABLE.lend(),
+            PIXELS.lend(),
+        )
+    }
 }

@@ -6,15 +6,16 @@
 use cortex_m_rt::entry;
 use firmware::Lent;
 use firmware::kernels::{Input, run_full};
-use relume::relight::Lum;
+use relume::relight::{Form, FrameLight, Lum};
 
 include!(concat!(env!("FIRMWARE_DATA"), "/lum_1920x30.rs"));
 
-static TABLE: Lent<[[u32; 32]; 256]> = Lent::new([[0; 32]; 256]);
+static ROOM: Lent<[FrameLight; 30]> = Lent::new([FrameLight::EMPTY; 30]);
+static TABLES: Lent<[<Lum as Form>::Table; 30]> = Lent::new([Lum::EMPTY; 30]);
 static PIXELS: Lent<[u16; 1920]> = Lent::new([0; 1920]);
 
 #[entry]
 fn main() -> ! {
     // SAFETY: once.
-    unsafe { run_full::<Lum, 30, 32>(&INPUT, TABLE.lend(), PIXELS.lend()) }
+    unsafe { run_full::<Lum, 30>(&INPUT, ROOM.lend(), TABLES.lend(), PIXELS.lend()) }
 }

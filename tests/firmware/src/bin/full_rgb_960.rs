@@ -6,15 +6,16 @@
 use cortex_m_rt::entry;
 use firmware::Lent;
 use firmware::kernels::{Input, run_full};
-use relume::relight::Colour;
+use relume::relight::{Colour, Form, FrameLight};
 
 include!(concat!(env!("FIRMWARE_DATA"), "/rgb_960x8.rs"));
 
-static TABLE: Lent<[[[u16; 8]; 256]; 3]> = Lent::new([[[0; 8]; 256]; 3]);
+static ROOM: Lent<[FrameLight; 8]> = Lent::new([FrameLight::EMPTY; 8]);
+static TABLES: Lent<[<Colour as Form>::Table; 8]> = Lent::new([Colour::EMPTY; 8]);
 static PIXELS: Lent<[u16; 960]> = Lent::new([0; 960]);
 
 #[entry]
 fn main() -> ! {
     // SAFETY: once.
-    unsafe { run_full::<Colour, 8, 8>(&INPUT, TABLE.lend(), PIXELS.lend()) }
+    unsafe { run_full::<Colour, 8>(&INPUT, ROOM.lend(), TABLES.lend(), PIXELS.lend()) }
 }

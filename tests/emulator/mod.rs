@@ -1,0 +1,144 @@
+//! Builds the bare-metal images of `tests/firmware`, and starts them in an emulator.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::{env, fs};
+
+use serde_json::{Value, json};
+
+/// Cortex-M0, M3 and M4F.
+pub const TARGETS: [&str; 3] = [
+    "thumbv6m-none-eabi",
+    "thumbv7m-none-eabi",
+    "thumbv7em-none-eabihf",
+];
+
+/// The one without hardware for floats.
+pub const SMALL: &str = TARGETS[0];
+
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+pub fn work() -> PathBuf {
+    root().join("target/firmware")
+}
+
+/// Whether all tools are there; else says what to install, and fails on a build server.
+pub fn has_tools() -> bool {
+    let works = |program: &str| Command::new(program).arg("--version").output().is_ok();
+    let missing: Vec<&str> = ["qemu-system-arm", "arm-none-eabi-size", "arm-none-eabi-nm"]
+        .into_iter()
+        .filter(|program| !works(program))
+        .collect();
+    let script = Command::new("bash")
+        .args(["-c", "source .ci/bare-metal.sh thumbv6m-none-eabi --check"])
+        .current_dir(root())
+        .status();
+    if missing.is_empty() && script.is_ok_and(|status| status.success()) {
+        return true;
+    }
+    let told = format!(
+        "no firmware was built or run; missing: {missing:?} or a compiler for it. Install all with: bash .ci/bare-metal.sh all"
+    );
+    assert!(env::var_os("CI").is_none(), "{told}");
+    eprintln!("\nSKIPPED: {told}\n");
+    false
+}
+
+/// Builds images for a target.
+pub fn build(target: &str, images: &[&str], options: &str) -> Output {
+    let bins = images.join(" --bin ");
+    let script = format!(
+        "source .ci/bare-metal.sh {target} && cd tests/firmware && \
+         cargo build --profile {} --locked --target {target} --bin {bins} {options}",
+        profile(target)
+    );
+    Command::new("bash")
+        .args(["-c", &script])
+        .current_dir(root())
+        .env("CARGO_TARGET_DIR", work().join("target"))
+        .env("FIRMWARE_DATA", work().join("data"))
+        // Those of the cargo that runs this test.
+        .env_remove("CARGO")
+        .env_remove("RUSTC")
+        .env_remove("RUSTFLAGS")
+        .output()
+        .expect("bash")
+}
+
+/// What a target is compiled for: the small core has little flash.
+fn profile(target: &str) -> &'static str {
+    if target == SMALL { "small" } else { "release" }
+}
+
+pub fn image(target: &str, name: &str) -> PathBuf {
+    work()
+        .join("target")
+        .join(target)
+        .join(profile(target))
+        .join(name)
+}
+
+/// Starts an image in the emulator of its target: exit status and what it said.
+pub fn emulate(target: &str, name: &str) -> (Option<i32>, String) {
+    let config = fs::read_to_string(root().join("tests/firmware/.cargo/config.toml"));
+    let config = config.expect("it is checked in");
+    let (_, own) = config
+        .split_once(&format!("[target.{target}]"))
+        .expect("a runner");
+    let (_, runner) = own.split_once("runner = \"").expect("a runner");
+    let (runner, _) = runner.split_once('"').expect("in quotes");
+    let output = Command::new("timeout")
+        .arg("120")
+        .args(runner.split(' '))
+        .arg(image(target, name))
+        .output()
+        .expect("the emulator");
+    let said = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+    (output.status.code(), said.into_owned())
+}
+
+/// A number that an image said.
+pub fn said(text: &str, name: &str) -> Option<u32> {
+    let line = text
+        .lines()
+        .find_map(|line| line.strip_prefix(&format!("{name} 0x")));
+    u32::from_str_radix(line?.trim(), 16).ok()
+}
+
+/// Bytes of flash and of static RAM.
+pub fn size(image: &Path) -> [u64; 2] {
+    let output = Command::new("arm-none-eabi-size")
+        .args(["-A"])
+        .arg(image)
+        .output();
+    let text = String::from_utf8(output.expect("binutils").stdout).expect("plain text");
+    let of = |section: &str| {
+        let line = text
+            .lines()
+            .find(|line| line.split_whitespace().next() == Some(section));
+        let bytes = line.and_then(|line| line.split_whitespace().nth(1)?.parse().ok());
+        bytes.unwrap_or(0_u64)
+    };
+    let flash = of(".vector_table") + of(".text") + of(".rodata") + of(".data");
+    [flash, of(".data") + of(".bss") + of(".uninit")]
+}
+
+/// Modelled time of so many instructions, ms, and the words of the model: one instruction per cycle, memory that never waits.
+pub fn modelled(target: &str, instructions: u64) -> [(&'static str, Value); 3] {
+    let clock = if target.ends_with(SMALL) { 16 } else { 168 };
+    [
+        ("ms", json!(instructions as f64 / f64::from(1000 * clock))),
+        ("clock_mhz", json!(clock)),
+        ("model", json!("one instruction per cycle, no wait states")),
+    ]
+}
+
+/// Leaves rows for `tests/firmware/run --json`, one a line, in a file of this name.
+pub fn write_rows(name: &str, rows: &[Value]) {
+    let folder = work().join("rows");
+    fs::create_dir_all(&folder).expect("a folder that can be written to");
+    let lines: String = rows.iter().map(|row| format!("{row}\n")).collect();
+    fs::write(folder.join(name), lines).expect("a folder that can be written to");
+}
