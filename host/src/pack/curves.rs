@@ -313,7 +313,11 @@ fn steps(intervals: &[[f32; 2]], first: f32, unit: u8) -> Option<[u8; PARTS / 2]
             let mut begun = open.iter().take_while(|[low, _]| *low <= end);
             begun.all(|[low, high]| begin + ((low - begin) / step).ceil() * step <= *high)
         })?;
-        steps[part / 2] |= if part % 2 == 0 { place } else { place << 4 };
+        steps[part / 2] |= if part.is_multiple_of(2) {
+            place
+        } else {
+            place << 4
+        };
         last = begin + codes * step(place);
         begin += f32::from(PART_CODES) * step(place);
     }

@@ -175,7 +175,11 @@ impl Curve {
             return 0;
         };
         let pair = steps.get(usize::from(part / 2)).copied().unwrap_or(0);
-        let place = if part % 2 == 0 { pair & 15 } else { pair >> 4 };
+        let place = if part.is_multiple_of(2) {
+            pair & 15
+        } else {
+            pair >> 4
+        };
         let step = PART_STEPS.get(usize::from(place)).copied().unwrap_or(0);
         u32::from(step) << (*unit).min(LARGEST_PART_UNIT)
     }
