@@ -38,7 +38,7 @@ fn codes(criterion: &mut Criterion) {
         ("exp8s", Curve::Exponential { scale }, 255),
         (
             "display8",
-            Curve::display_between(white, 1e-4, 1.0, 255).expect("it fits"),
+            Curve::display_between(white, 1e-4, 1.0).expect("it fits"),
             255,
         ),
         ("tiles", Curve::display(white, 1.85).expect("it fits"), 1000),

@@ -3,40 +3,46 @@
 //! Integers multiply on the way, or only add from a table of all products that is filled anew for every frame.
 //! Beside them the time to copy the same code bytes, in the same unit: what memory alone would take.
 //! A change of one light counts the elements of that light only; what matters is its time, which
-//! takes the place of a whole relight. Two sizes: the paper's room with 8 lights (23 kB of codes), and
-//! 8000 elements with 64 lights (1.5 MB). On one thread.
+//! takes the place of a whole relight. Two sizes: that of the paper's room with 8 lights (23 kB of codes), and
+//! 8000 elements with 64 lights (1.5 MB), each in every code. On one thread.
 
 mod scenes;
 
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput};
-use relume::atlas::{Atlas, Contents, LightEntry, Quantity, size, write};
-use relume::code::{Code, Scale};
+use relume::atlas::Atlas;
+use relume::code::Code;
 use relume::color::Rgb;
 use relume::relight::{
     DecodeTable, FixedMix, FixedTable, FixedWeight, change_fixed, relight, relight_fixed,
     table_length,
 };
+use relume_host::pack::pack_unmeasured;
+use relume_host::solution::Solution;
 
 fn main() {
     let mut criterion = scenes::criterion();
-    for code in [Code::Exp8s, Code::Lum8] {
-        measure(&mut criterion, 960, 8, code);
+    for code in Code::ALL {
+        measure(&mut criterion, [40, 24], 8, code);
     }
-    measure(&mut criterion, 8000, 64, Code::Exp8s);
+    for code in Code::ALL {
+        measure(&mut criterion, [100, 80], 64, code);
+    }
     criterion.final_summary();
 }
 
-fn measure(criterion: &mut Criterion, elements: u32, lights: u32, code: Code) {
-    let bytes = atlas_bytes(elements, lights, code);
+fn measure(criterion: &mut Criterion, size: [u32; 2], lights: u32, code: Code) {
+    let bytes = atlas_bytes(size, lights, code);
     let atlas = Atlas::parse(&bytes).expect("bytes just written");
+    let elements = atlas.element_count();
     let name = format!("relight/{elements} x {lights} {code}");
     let mix: Vec<Rgb> = (0..lights)
         .map(|light| Rgb::splat(0.1 + 0.01 * light as f32))
         .collect();
 
-    copy(criterion, &name, &atlas);
+    let (_, codes) = bytes.split_at(bytes.len() - atlas.code_bytes());
+    copy(criterion, &name, &atlas, codes);
     float(criterion, &name, &atlas, &mix);
     fixed(criterion, &name, &atlas, &mix);
     change(criterion, &name, &atlas, &mix);
@@ -47,13 +53,13 @@ fn contributions(atlas: &Atlas) -> Throughput {
     Throughput::Elements(u64::from(atlas.element_count()) * u64::from(atlas.light_count()))
 }
 
-fn copy(criterion: &mut Criterion, name: &str, atlas: &Atlas) {
-    let mut copied = vec![0; atlas.codes().len()];
+fn copy(criterion: &mut Criterion, name: &str, atlas: &Atlas, codes: &[u8]) {
+    let mut copied = vec![0; codes.len()];
     let mut group = criterion.benchmark_group(name);
     group.throughput(contributions(atlas));
     group.bench_function("copy of the codes", |bencher| {
         bencher.iter(|| {
-            copied.copy_from_slice(black_box(atlas.codes()));
+            copied.copy_from_slice(black_box(codes));
             black_box(&copied);
         });
     });
@@ -121,23 +127,22 @@ fn change(criterion: &mut Criterion, name: &str, atlas: &Atlas, mix: &[Rgb]) {
     group.finish();
 }
 
-/// An atlas without mesh whose codes take all values.
-fn atlas_bytes(elements: u32, lights: u32, code: Code) -> Vec<u8> {
-    let entry = LightEntry::exponential("", Rgb::WHITE, code, Scale::ONE);
-    let contents = Contents {
-        quantity: Quantity::Irradiance,
-        lights: &vec![entry; lights as usize],
-        elements,
-        image_width: 0,
-        errors: None,
-        tiles: &[],
-        mesh: None,
-    };
+/// An atlas of an image in which every light falls off around a place of its own.
+fn atlas_bytes([width, height]: [u32; 2], lights: u32, code: Code) -> Vec<u8> {
     let contribution = |element: u32, light: u32| {
-        let phase = 0.37 * element as f32 + 1.7 * light as f32;
-        Rgb::new(1.0 + phase.sin(), 1.0 + phase.cos(), 0.3) * 2.5
+        let (x, y) = ((element % width) as f32, (element / width) as f32);
+        let phase = 2.4 * light as f32;
+        let across = x / width as f32 - 0.5 - 0.4 * phase.cos();
+        let down = y / height as f32 - 0.5 - 0.4 * phase.sin();
+        let strength = 1.0 / (0.01 + across * across + down * down);
+        Rgb::new(1.0, 0.7 + 0.2 * across, 0.5 + 0.2 * down) * strength
     };
-    let mut bytes = vec![0; size(&contents).expect("an atlas that fits")];
-    write(&contents, contribution, &mut bytes).expect("an atlas that fits");
-    bytes
+    let names = (0..lights).map(|light| (light.to_string(), Rgb::WHITE));
+    let elements = 0..width * height;
+    let contributions = elements.flat_map(|e| (0..lights).map(move |light| contribution(e, light)));
+    let solution = Solution {
+        image: Some([width, height]),
+        ..Solution::from_contributions(names, contributions.collect())
+    };
+    pack_unmeasured(&solution, code.into()).expect("an atlas that fits")
 }

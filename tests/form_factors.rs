@@ -440,6 +440,9 @@ fn bad_cases_are_refused_with_their_name_and_a_remedy() {
     );
     let line = refused(&json!({"cases": [{"name": "a", "to": good()}]}).to_string());
     assert!(line.contains("`a`, from is missing"), "{line}");
+    let speck = json!([[0, 0, 0], [0, 1e-90, 0], [1e-90, 0, 0]]);
+    let line = refused(&json!({"cases": [{"name": "a", "from": speck, "to": good()}]}).to_string());
+    assert!(line.contains("`a`: one polygon is 1e30 times"), "{line}");
     let five = json!([[0, 0, 0], [2, 0, 0], [3, 1, 0], [1, 2, 0], [0, 1, 0]]);
     folder.write(
         "five.json",

@@ -30,7 +30,7 @@ use relume_host::pack::{
 use relume_host::solution::{Method, Solution, SolutionLight};
 
 /// Light counts of the issue.
-const COUNTS: [usize; 5] = [1, 3, 8, 64, 256];
+const COUNTS: [usize; 9] = [1, 3, 8, 10, 16, 32, 64, 128, 256];
 
 fn bake_scene(name: &str, element: Option<f32>) -> Option<Solution> {
     let file = data_dir()?.join("scenes").join(name).join("scene.obj");
@@ -144,17 +144,13 @@ fn sixty_four_lights_take_less_than_the_paper_took_for_eight() {
 
 /// Bakes 8640 elements of 64 and of 256 lights: minutes of CPU.
 ///
-/// 64 lights keep the aims of the issue; 256 keep that of `tiles` and miss the others: limits there are what was
-/// measured (10.64 bits in `tiles-log`; 2.24 and 3.44 codes in `display8`). What the rays of 256 dim lights leave
-/// to chance takes bits: baked with `--method rows` the same room takes 7.0 and 9.4.
+/// All aims of the issue but one are kept: `tiles-log` of 256 lights takes 10.64 bits, not 10. What the rays of so many
+/// dim lights leave to chance takes bits: baked with `--method rows` the same room takes 9.4, and 7.0 in `tiles`.
 #[test]
 #[ignore = "slow: run it by name"]
 fn eight_bits_hold_an_element_on_the_fine_mesh() {
-    let aims = [
-        ("seed_room_64", 8.0, 10.0, [2.0, 3.0]),
-        ("seed_room_256", 8.0, 10.7, [2.3, 3.5]),
-    ];
-    for (name, tiles, tiles_log, [achromatic, all]) in aims {
+    let aims = [("seed_room_64", 8.0, 10.0), ("seed_room_256", 8.0, 10.7)];
+    for (name, tiles, tiles_log) in aims {
         let Some(room) = bake_scene(name, Some(0.083_333_3)) else {
             return;
         };
@@ -167,9 +163,13 @@ fn eight_bits_hold_an_element_on_the_fine_mesh() {
         let found = bits(&bytes, &room);
         assert!(found <= tiles_log, "{name}: {found} bits");
         assert!(error.largest() <= 1.0, "{name}: {error:?}");
-        let (_, error) = packed(&room, Code::Display8);
-        assert!(error.achromatic.packed <= achromatic, "{name}: {error:?}");
-        assert!(error.all.packed <= all, "{name}: {error:?}");
+        for lights in COUNTS.into_iter().filter(|k| *k <= room.lights.len()) {
+            let (_, error) = packed(&first(&room, lights), Code::Display8);
+            let (achromatic, all) = (error.achromatic.packed, error.all.packed);
+            println!("{name}: {lights} lights in display8, {achromatic} and {all} codes");
+            assert!(achromatic <= 2.0, "{name} {lights}: {error:?}");
+            assert!(all <= 3.0, "{name} {lights}: {error:?}");
+        }
     }
 }
 

@@ -23,7 +23,7 @@
 #include <stdint.h>
 
 // Words of memory for each light of `relume_irradiance`.
-#define RELUME_LIGHT_WORDS 20
+#define RELUME_LIGHT_WORDS 36
 
 // How a call ended.
 typedef enum RelumeStatus {

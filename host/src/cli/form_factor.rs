@@ -17,6 +17,9 @@ use super::load::read;
 use super::{Outcome, tell, write_file};
 use crate::polygon_pair::{ConvexPolygon, Estimate, form_factor};
 
+/// Polygons of one pair may differ in size by this; far beyond it products of their coordinates vanish.
+const LARGEST_RATIO: f64 = 1e30;
+
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Pairs of polygons with their blockers, as JSON (see the README)
@@ -121,12 +124,26 @@ fn parse_case(number: usize, case: &Value) -> Result<Case> {
     let blockers = blockers.iter().enumerate();
     let blockers =
         blockers.map(|(k, value)| polygon(value).with_context(|| place(&format!("blocker {k}"))));
+    let (from, to) = (outline("from")?, outline("to")?);
+    let (small, large) = (size(&from).min(size(&to)), size(&from).max(size(&to)));
+    if small < large / LARGEST_RATIO {
+        bail!(
+            "case {number} `{name}`: one polygon is {LARGEST_RATIO:e} times as large as the other one; divide it"
+        );
+    }
     Ok(Case {
         name: name.to_owned(),
-        from: outline("from")?,
-        to: outline("to")?,
+        from,
+        to,
         blockers: blockers.collect::<Result<_>>()?,
     })
+}
+
+/// The longest way from its first vertex.
+fn size(polygon: &ConvexPolygon) -> f64 {
+    let vertices = polygon.vertices();
+    let lengths = vertices.iter().map(|v| (*v - vertices[0]).length());
+    lengths.fold(0.0, f64::max)
 }
 
 fn polygon(value: &Value) -> Result<ConvexPolygon> {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 use relume::atlas::{Atlas, LARGEST_SIDE, Quantity, Tiles};
-use relume::code::{Curve, LOG_STEPS};
+use relume::code::{Curve, KNOT_UNITS, LOG_STEPS};
 use relume::relight::FixedWeight;
 use serde_json::{Value, json};
 
@@ -131,10 +131,13 @@ fn device(atlas: &Atlas, bytes: usize, core: Core) -> Value {
 fn curve(curve: Curve) -> Value {
     match curve {
         Curve::Exponential { scale } => json!({"scale": scale.value()}),
-        Curve::Display { white, first, step } => json!({
+        Curve::Display { white, step } => json!({
             "white": white.value(),
-            "first": Curve::display_codes(first),
             "step": Curve::display_codes(step),
+        }),
+        Curve::Knots { white, knots } => json!({
+            "white": white.value(),
+            "knots": knots.map(|knot| f32::from(knot) / f32::from(KNOT_UNITS)),
         }),
         Curve::Logarithmic { .. } => json!({"steps_per_octave": LOG_STEPS}),
     }

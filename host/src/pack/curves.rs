@@ -1,24 +1,25 @@
 //! What the codes of every light stand for.
 //!
 //! `exp8` has one scale, as published; `exp8s` and `lum8` put the largest value of a light at their top.
-//! `display8` has 256 levels for every channel of a light. Where its white lies decides what they are spent on: below it steps are
-//! uniform on a display that this light alone exposes, above it they are uniform in ratio, which is what counts when
-//! the light is one of many, or when it shines in one primary: then the exposure follows
-//! the luminance, `0.2126 R + 0.7152 G + 0.0722 B`, and blue is up to 14 times overexposed. Some whites are tried, each with
-//! some spacings, and the one is taken whose largest error is least among
+//! `display8` has 256 levels for every channel of a light, in 16 parts of equal steps (see [`Curve::Knots`]). A level may
+//! stand for a value where it bears that, at a tolerance `t` and in
 //!
-//! * the display error of the light alone in its own colour, of which 2 codes are bearable,
-//! * that of the channel alone, of which 3.2 codes are bearable,
-//! * both of what is shown, with the reflectance of the element, of which a fifth more is bearable,
-//! * above white, the relative error times 112.09, the display error where this light is dimmed among
-//!   others and dominates an element, of which 2.3 codes are bearable.
+//! * the light alone in its own colour, where `2 t` display codes are bearable,
+//! * the channel alone, where `3 t` are: then the exposure follows the luminance, `0.2126 R + 0.7152 G + 0.0722 B`, and blue is
+//!   up to 14 times overexposed,
+//! * the light among all others at their nominal emission, 16 times overexposed, where `3 t` are,
+//! * all three of what is shown, with the reflectance of the element, where a fifth more is bearable,
+//! * above white any state, if the relative error times 112.09 is at most `2 t`: that is the display error where this light is
+//!   dimmed among others and dominates an element.
 //!
-//! These bounds were found by trying, in rooms of 64 and 256 lights: with them, no state of one light and no mix is
-//! much worse than the others.
+//! So every value has an interval, and each part in turn takes the longest steps with which a level falls into all intervals
+//! that begin before its end: where values are rare, above all in hot spots, levels are too. The least `t` with
+//! which the levels suffice is searched. All mixes of several lights are left out of this: what they are off by
+//! is a mean of what their lights are off by, each of which rounds for itself.
 
 use rayon::prelude::*;
 use relume::atlas::{LARGEST_TILE_CODE, LightEntry, Quantity};
-use relume::code::{Code, Curve, Scale, display_code};
+use relume::code::{Code, Curve, KNOT_CODES, KNOT_UNITS, KNOTS, Scale, srgb_linear};
 use relume::color::Rgb;
 
 use super::{PackError, Packing, Source};
@@ -26,14 +27,19 @@ use crate::display_error::{Solo, shown_code};
 use crate::picture::white;
 use crate::solution::Solution;
 
-/// Values of a channel on which curves are judged: this many of the largest, and of all by rank.
-const SAMPLES: usize = 1024;
+/// What the light's own white is over that of its curves: below the latter, steps of a part are uniform on a display, above
+/// it in ratio.
+const WHITES: [f32; 6] = [4.0, 1.0, 2.0, 8.0, 16.0, 32.0];
 
-/// Whites that are tried: own white over powers of the fourth root of 2.
-const WHITES: u8 = 25;
+/// Tolerances that are tried lie between these.
+const LEAST_TOLERANCE: f32 = 1e-3;
+const MOST_TOLERANCE: f32 = 64.0;
 
-/// Spacings that are tried, in quarters of a level beyond the largest value.
-const SPACINGS: u8 = 12;
+/// Ratio of two tolerances that are not told apart.
+const TOLERANCE: f32 = 1.01;
+
+/// Ratio of the steps of a part that are tried one after the other.
+const STEPS: f32 = 0.98;
 
 /// Display codes per relative error at white: `255 * 1.055 / 2.4`.
 const CODES_PER_RATIO: f32 = 112.093_75;
@@ -45,17 +51,20 @@ const PRIMARIES: [Rgb; 3] = [
     Rgb::new(0.0, 0.0, 1.0),
 ];
 
-/// Values that were bad on a curve before, and are looked at first.
-const KNOWN: usize = 4;
+/// Bearable display errors of a light alone, in its colour and in a primary, and among all others when overexposed.
+const BEARABLE: [f32; STATES] = [2.0, 3.0, 3.0];
 
-/// Bearable display errors of a light alone, in its colour and in a primary.
-const BEARABLE: [f32; 2] = [2.0, 3.2];
+/// Exposure in the last of these states, over that which suits it.
+const OVEREXPOSED: f32 = 16.0;
+
+/// States in which a value is judged.
+const STATES: usize = 3;
 
 /// How much more is bearable of what is shown.
 const MORE_SHOWN: f32 = 1.2;
 
 /// Bearable relative error above white, times [`CODES_PER_RATIO`].
-const BEARABLE_RATIO: f32 = 2.3;
+const BEARABLE_RATIO: f32 = 2.0;
 
 /// The lights with their curves; a packing per light.
 pub(super) fn entries<'a>(
@@ -64,6 +73,7 @@ pub(super) fn entries<'a>(
 ) -> Result<Vec<LightEntry<'a>>, PackError> {
     let (solution, values) = (source.solution, &*source.values);
     let common = common_scales(solution, values);
+    let stage = Stage::new(source);
     let lights = solution.lights.len();
     let entry = |light: usize| {
         let SolutionNames { name, emission } = names(solution, light);
@@ -80,7 +90,7 @@ pub(super) fn entries<'a>(
             Code::Lum8 => exponential(Scale::fitting(largest(own().map(Rgb::luminance)))),
             Code::Display8 => {
                 let own: Vec<Rgb> = own().collect();
-                let [Some(r), Some(g), Some(b)] = display_curves(source, &own, emission) else {
+                let [Some(r), Some(g), Some(b)] = display_curves(&stage, &own, emission) else {
                     return Err(refused());
                 };
                 Ok(LightEntry {
@@ -146,11 +156,9 @@ fn scale_or_one(white: f32) -> Scale {
 /// in units of light `m`, at nominal emission `e_m`, is `p98 / e_m`.
 fn common_scales(solution: &Solution, values: &[Rgb]) -> Vec<Option<Scale>> {
     let nominal = solution.nominal_mix();
-    let state = values.chunks(nominal.len().max(1)).map(|values| {
-        let weighted = values.iter().zip(&nominal);
-        weighted.fold(Rgb::BLACK, |sum, (value, weight)| sum + *value * *weight)
-    });
-    let one = Some(white(state)).filter(|w| *w > 0.0).unwrap_or(1.0);
+    let one = Some(white(all_on(solution, values)))
+        .filter(|w| *w > 0.0)
+        .unwrap_or(1.0);
     nominal
         .iter()
         .map(|emission| {
@@ -160,143 +168,220 @@ fn common_scales(solution: &Solution, values: &[Rgb]) -> Vec<Option<Scale>> {
         .collect()
 }
 
+/// The state of all lights at their nominal emission.
+fn all_on<'a>(solution: &Solution, values: &'a [Rgb]) -> impl Iterator<Item = Rgb> + Clone + 'a {
+    let nominal = solution.nominal_mix();
+    values.chunks(nominal.len().max(1)).map(move |values| {
+        let weighted = values.iter().zip(&nominal);
+        weighted.fold(Rgb::BLACK, |sum, (value, weight)| sum + *value * *weight)
+    })
+}
+
+/// What `display8` needs to know of all lights together.
+struct Stage {
+    /// Reflectances of the elements, 1 where they are multiplied in.
+    reflectances: Vec<Rgb>,
+    /// What shows as white with all lights on, 16 times overexposed: packed and shown.
+    overexposed: [f32; 2],
+}
+
+impl Stage {
+    fn new(source: &Source) -> Self {
+        let solution = source.solution;
+        let reflectances: Vec<Rgb> = match source.quantity {
+            Quantity::Irradiance => {
+                let elements = solution.mesh.elements.iter();
+                elements.map(|element| element.reflectance).collect()
+            }
+            Quantity::Radiosity | Quantity::Radiance => {
+                vec![Rgb::WHITE; solution.element_count()]
+            }
+        };
+        let all_on: Vec<Rgb> = all_on(solution, &source.values).collect();
+        let overexposed = whites(all_on.iter().copied(), &reflectances);
+        Self {
+            reflectances,
+            overexposed: overexposed.map(|white| white / OVEREXPOSED),
+        }
+    }
+}
+
+/// What shows as white in a state: packed and shown.
+fn whites(lit: impl Iterator<Item = Rgb> + Clone, reflectances: &[Rgb]) -> [f32; 2] {
+    let shown = lit.clone().zip(reflectances);
+    [white(lit), white(shown.map(|(value, rho)| value * *rho))]
+}
+
 /// The best display curve of each channel of a light.
-fn display_curves(source: &Source, own: &[Rgb], emission: Rgb) -> [Option<Curve>; 3] {
-    let reflectances: Vec<Rgb> = match source.quantity {
-        Quantity::Irradiance => source
-            .solution
-            .mesh
-            .elements
-            .iter()
-            .map(|e| e.reflectance)
-            .collect(),
-        Quantity::Radiosity | Quantity::Radiance => vec![Rgb::WHITE; own.len()],
-    };
-    let whites = |weight: Rgb| {
-        let lit = own.iter().map(|value| *value * weight);
-        let shown = lit
-            .clone()
-            .zip(&reflectances)
-            .map(|(value, rho)| value * *rho);
-        [white(lit), white(shown)]
-    };
+fn display_curves(stage: &Stage, own: &[Rgb], emission: Rgb) -> [Option<Curve>; 3] {
+    let alone = |weight: Rgb| whites(own.iter().map(|value| *value * weight), &stage.reflectances);
     let nominal = Solo::Nominal.weight(emission);
-    let in_nominal = whites(nominal);
+    let in_nominal = alone(nominal);
     [0, 1, 2].map(|channel| {
         let at = |rgb: Rgb| rgb.to_array()[channel];
         // A light that lacks this channel shows it in its primary only.
         let nominal = in_nominal.map(|white| white / at(nominal));
-        let primary = whites(PRIMARIES[channel]);
-        let places = own.iter().zip(&reflectances);
+        let overexposed = stage.overexposed.map(|white| white / at(emission));
+        let states = [nominal, alone(PRIMARIES[channel]), overexposed];
+        let places = own.iter().zip(&stage.reflectances);
         let samples = places
-            .map(|(value, rho)| Sample::new(at(*value), at(*rho), nominal, primary))
+            .map(|(value, rho)| Sample::new(at(*value), at(*rho), states))
             .collect();
         display_curve(samples, nominal[0].min(white(own.iter().copied())))
     })
 }
 
 /// The best of the display curves of one channel, whose light has this white.
-fn display_curve(mut all: Vec<Sample>, own_white: f32) -> Option<Curve> {
-    const LAST: u16 = u8::MAX as u16;
-    all.sort_unstable_by(|a, b| a.value.total_cmp(&b.value));
-    let (Some(smallest), Some(largest)) = (all.first(), all.last()) else {
-        return Curve::display_between(Scale::ONE, 0.0, 1.0, LAST);
-    };
-    let (smallest, largest) = (smallest.value, largest.value);
-    if own_white <= 0.0 || Scale::at_least(own_white).is_none() {
-        return Curve::display_between(Scale::ONE, smallest, largest, LAST);
+fn display_curve(samples: Vec<Sample>, own_white: f32) -> Option<Curve> {
+    let values = samples.iter().map(|sample| sample.value);
+    let smallest = values.clone().min_by(f32::total_cmp).unwrap_or(0.0);
+    let even = |white: Scale| Curve::display_between(white, smallest, largest(values.clone()));
+    let own = Scale::at_least(own_white).filter(|_| own_white > 0.0);
+    if own.is_none() {
+        return even(Scale::ONE);
     }
-    let step = (all.len() / SAMPLES).max(1);
-    let top = all.len().saturating_sub(SAMPLES);
-    let judging = all.iter().enumerate();
-    let judging = judging.filter(|(rank, _)| rank % step == 0 || *rank >= top);
-    let mut samples: Vec<Sample> = judging.map(|(_, sample)| *sample).collect();
-
-    let mut best = (f32::INFINITY, None);
-    for part in 0..WHITES {
-        let white = scale_or_one(own_white * 2.0_f32.powf(-0.25 * part as f32));
-        let code = |value: f32| display_code(value / white.value());
-        let level = (code(largest) - code(smallest)) / f32::from(LAST);
-        for parts in 0..SPACINGS {
-            let beyond = (level * parts as f32 / 4.0 / CODES_PER_RATIO).exp();
-            let Some(curve) = Curve::display_between(white, smallest, largest * beyond, LAST)
-            else {
-                continue;
-            };
-            // What was bad on one curve is looked at first on the next, mostly in vain for the curve.
-            let nearest = |value: f32| curve.decode(curve.encode(value, LAST));
-            let known = samples.iter().take(KNOWN);
-            if known.clone().any(|s| s.cost(nearest(s.value)) >= best.0) {
-                continue;
-            }
-            let levels: Vec<f32> = (0..=LAST).map(|code| curve.decode(code)).collect();
-            let mut cost = 0.0_f32;
-            let bad = samples.iter().position(|sample| {
-                cost = cost.max(sample.cost(sample.nearest(&levels)));
-                cost >= best.0
-            });
-            match bad {
-                Some(bad) => samples[..=bad].rotate_right(1),
-                None => best = (cost, Some(curve)),
-            }
+    let (mut best, mut least) = (even(scale_or_one(own_white)), MOST_TOLERANCE);
+    for part in WHITES {
+        let white = scale_or_one(own_white / part);
+        // Most whites are no better than the one before them.
+        if let Some((tolerance, knots)) = tightest(&samples, white.value(), least / TOLERANCE) {
+            (best, least) = (Some(Curve::Knots { white, knots }), tolerance);
         }
     }
-    best.1
+    best
 }
 
-/// A value on which curves are judged.
+/// Knots of the least tolerance, and that; `None` when it is above `most`.
+fn tightest(samples: &[Sample], white: f32, most: f32) -> Option<(f32, [u16; KNOTS])> {
+    let at = |tolerance: f32| Some((tolerance, knots(samples, white, tolerance)?));
+    let mut best = at(most)?;
+    let mut low = 0.0;
+    while best.0 > LEAST_TOLERANCE && best.0 > TOLERANCE * low {
+        let middle = if low > 0.0 {
+            (low * best.0).sqrt()
+        } else {
+            best.0 / 2.0
+        };
+        match at(middle) {
+            Some(found) => best = found,
+            None => low = middle,
+        }
+    }
+    Some(best)
+}
+
+/// Knots of a curve that has a level in the interval of every sample; `None` when so many parts do not suffice.
+fn knots(samples: &[Sample], white: f32, tolerance: f32) -> Option<[u16; KNOTS]> {
+    let unit = |value: f32| f32::from(KNOT_UNITS) * continued_code(value / white);
+    let intervals = samples.iter().map(|s| s.interval(tolerance).map(unit));
+    let mut intervals: Vec<[f32; 2]> = intervals.collect();
+    intervals.sort_unstable_by(|[a, _], [b, _]| a.total_cmp(b));
+    let start = intervals.iter().map(|[_, to]| *to);
+    let mut knots = [start.fold(f32::INFINITY, f32::min).max(0.0) as u16; KNOTS];
+    let mut open = &intervals[..];
+    for part in 1..KNOTS {
+        let from = knots[part - 1];
+        let begin = f32::from(from);
+        open = &open[open.partition_point(|[low, _]| *low <= begin)..];
+        // Past the last code there is no level.
+        let codes = KNOT_CODES - u16::from(part == KNOTS - 1);
+        let holds = |length: u16| {
+            let step = f32::from(length) / f32::from(KNOT_CODES);
+            let level = |code: f32| begin + code * step;
+            let end = level(codes.into());
+            let mut begun = open.iter().take_while(|[low, _]| *low <= end);
+            begun.all(|[low, high]| level(((low - begin) / step).ceil()) <= *high)
+        };
+        let left = u16::MAX - from;
+        let lengths = std::iter::successors(Some(LONGEST_PART.min(left)), |length| {
+            Some((f32::from(*length) * STEPS) as u16)
+        });
+        let length = if open.is_empty() {
+            left.min(1)
+        } else {
+            lengths
+                .take_while(|length| *length > 0)
+                .find(|l| holds(*l))?
+        };
+        knots[part] = from + length;
+    }
+    let [.., from, to] = knots;
+    let last = f32::from(to) - f32::from(to - from) / f32::from(KNOT_CODES);
+    let is_reached = intervals.last().is_none_or(|[low, _]| *low <= last);
+    (is_reached && knots.is_sorted_by(|a, b| a < b)).then_some(knots)
+}
+
+/// The longest part, in units of knots: 1024 display codes.
+const LONGEST_PART: u16 = 1 << 14;
+
+/// The display code of a value over white, above it too; within 3e-4.
+fn continued_code(u: f32) -> f32 {
+    if u < 1.0 {
+        shown_code(u)
+    } else {
+        255.0 + CODES_PER_RATIO * u.ln()
+    }
+}
+
+/// A value for which levels are sought.
 #[derive(Clone, Copy)]
 struct Sample {
     value: f32,
-    /// What shows it as white: with the light alone, packed and shown, and with its channel alone.
-    whites: [f32; 4],
+    /// What shows it as white in every state, packed and shown.
+    whites: [[f32; 2]; STATES],
     /// Its display codes then.
-    shown: [f32; 4],
+    shown: [[f32; 2]; STATES],
 }
 
 impl Sample {
-    /// A value on a reflectance, with the whites of its light, packed and shown, in nominal colour and in the primary.
-    fn new(value: f32, reflectance: f32, nominal: [f32; 2], primary: [f32; 2]) -> Self {
-        let whites = [
-            nominal[0],
-            nominal[1] / reflectance,
-            primary[0],
-            primary[1] / reflectance,
-        ];
+    /// A value on a reflectance, with the whites of its light.
+    fn new(value: f32, reflectance: f32, whites: [[f32; 2]; STATES]) -> Self {
+        let whites = whites.map(|[packed, shown]| [packed, shown / reflectance]);
         Self {
             value,
             whites,
-            shown: whites.map(|white| shown_code(value / white)),
+            shown: whites.map(|whites| whites.map(|white| shown_code(value / white))),
         }
     }
 
-    /// The nearest of some levels, which rise.
-    fn nearest(&self, levels: &[f32]) -> f32 {
-        let above = levels.partition_point(|level| *level < self.value);
-        let near = &levels[above.saturating_sub(1)..levels.len().min(above + 1)];
-        let distance = |level: &f32| (level - self.value).abs();
-        let nearest = near.iter().copied();
-        let nearest = nearest.min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        nearest.unwrap_or(0.0)
+    /// From the smallest to the largest value that may take its place.
+    fn interval(&self, tolerance: f32) -> [f32; 2] {
+        let [mut low, mut high] = [0.0_f32, f32::INFINITY];
+        if self.value > self.whites[0][0] {
+            let ratio = tolerance * BEARABLE_RATIO / CODES_PER_RATIO;
+            [low, high] = [self.value * (1.0 - ratio), self.value * (1.0 + ratio)];
+        }
+        let bearable = BEARABLE.map(|codes| [codes * tolerance, codes * tolerance * MORE_SHOWN]);
+        let states = self.whites.iter().zip(&self.shown).zip(&bearable);
+        let states = states.flat_map(|((whites, shown), bearable)| {
+            whites
+                .iter()
+                .zip(shown)
+                .zip(bearable)
+                .map(|((w, s), b)| (*w, *s, *b))
+        });
+        // A colour or a place that shows nothing bears everything.
+        for (white, shown, bearable) in
+            states.filter(|(white, ..)| white.is_finite() && *white > 0.0)
+        {
+            low = low.max(white * linear(shown - bearable));
+            // The nearest level is taken, even where one that is clipped would do better.
+            if shown < WHITEST {
+                high = high.min(white * linear(shown + bearable));
+            }
+        }
+        [low.min(self.value), high.max(self.value)]
     }
+}
 
-    /// The largest of its errors over what is bearable, where `found` takes its place.
-    fn cost(&self, found: f32) -> f32 {
-        let [in_colour, in_primary] = BEARABLE;
-        let above = if self.value > self.whites[0] {
-            CODES_PER_RATIO * (found / self.value - 1.0).abs() / BEARABLE_RATIO
-        } else {
-            0.0
-        };
-        let states = self.whites.iter().zip(self.shown);
-        let states = states.zip([
-            in_colour,
-            in_colour * MORE_SHOWN,
-            in_primary,
-            in_primary * MORE_SHOWN,
-        ]);
-        states
-            .map(|((white, shown), bearable)| (shown_code(found / white) - shown).abs() / bearable)
-            .fold(above, f32::max)
+/// The display code of white.
+const WHITEST: f32 = 255.0;
+
+/// The value over white of a display code, above white too.
+fn linear(code: f32) -> f32 {
+    if code < WHITEST {
+        srgb_linear((code.max(0.0) * 4096.0) as u32) as f32 / 2_147_483_648.0
+    } else {
+        ((code - WHITEST) / CODES_PER_RATIO).exp()
     }
 }

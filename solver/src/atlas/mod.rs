@@ -1,11 +1,11 @@
 //! The atlas: packed contributions of every light to every element, as bytes that live in flash.
 //!
-//! Version 2, little-endian, no alignment needed. Lengths in bytes, `n` elements, `k` lights:
+//! Version 3, little-endian, no alignment needed. Lengths in bytes, `n` elements, `k` lights:
 //!
 //! | at | what |
 //! | --- | --- |
 //! | 0 | `RELUMEAT` |
-//! | 8 | `u16` version, 2 |
+//! | 8 | `u16` version, 3 |
 //! | 10 | `u8` quantity: 0 irradiance, 1 radiosity (reflectance multiplied in), 2 radiance |
 //! | 11 | three zero bytes |
 //! | 14 | `u16` width of the image whose pixels, row by row, are the elements; 0 for an atlas of no image |
@@ -19,8 +19,9 @@
 //! | 44 | `u32` faces, 0 without a mesh |
 //! | 48 | `f32` largest error of packing, see [`WorstError::packed`]; all ones: not measured |
 //! | 52 | `f32` the same of what is shown, see [`WorstError::shown`] |
-//! | 56 | `k` lights of 64: nominal emission `3 f32`, code `u8` (its place in [`Code::ALL`]), a zero byte, length of the name `u16`, largest error with this light alone `f32` (all ones: not measured), two zero bytes, for red, green and blue a [`Curve`] of 14: mantissa `u16` and exponent `i16` of its scale or white, first `u32`, step `u32`, last code `u16` (what a curve does not have is 0; the scale of a logarithmic one is 1) |
+//! | 56 | `k` lights of 64: nominal emission `3 f32`, code `u8` (its place in [`Code::ALL`]), a zero byte, length of the name `u16`, largest error with this light alone `f32` (all ones: not measured), two zero bytes, for red, green and blue a [`Curve`] of 14: mantissa `u16` and exponent `i16` of its scale or white, first `u32` (with knots the number of their row), step `u32`, last code `u16` (what a curve does not have is 0; the scale of a logarithmic one is 1) |
 //! | | the names one after the other, UTF-8 |
+//! | | three rows of knots for every light in `display8`: 17 `u16`, each above the one before it |
 //! | | codes: for every element, for every light that is not in tiles, 3 bytes of red, green and blue, or 1 of luminance |
 //! | | the tiles, see [`Tiles`] |
 //! | | with a mesh, surfaces of 52: four vertices `3 f32` (a triangle repeats its third), vertex count `u32` |
@@ -47,7 +48,7 @@ pub use tiles::{
 };
 pub use write::{Contents, LightEntry, size, write};
 
-use crate::code::{Code, Curve};
+use crate::code::{Code, Curve, KNOTS};
 use crate::color::Rgb;
 use crate::geometry::Polygon;
 use crate::mesh::Side;
@@ -55,7 +56,7 @@ use crate::scene::Emission;
 
 /// How an atlas starts.
 pub const MAGIC: [u8; 8] = *b"RELUMEAT";
-const VERSION: u16 = 2;
+const VERSION: u16 = 3;
 const HEADER_BYTES: usize = 56;
 const CHECKSUM_AT: usize = 20;
 const LIGHT_BYTES: usize = 64;
@@ -64,6 +65,9 @@ const CODE_AT: usize = 12;
 /// Where the curves of a light stand in its record, and how long one is.
 const CURVES_AT: usize = 22;
 const CURVE_BYTES: usize = 14;
+/// Knots of a curve, and of the three of a light.
+const ROW_BYTES: usize = 2 * KNOTS;
+const ROWS_BYTES: usize = 3 * ROW_BYTES;
 /// The largest code in tiles: differences of two fit 16 bits.
 pub const LARGEST_TILE_CODE: u16 = i16::MAX as u16;
 const SURFACE_BYTES: usize = 52;
@@ -229,6 +233,7 @@ fn checksum<K: Known>(bytes: &[u8]) -> Option<u32> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Layout {
     names: u64,
+    knots: u64,
     codes: u64,
     tiles: u64,
     surfaces: u64,
@@ -249,11 +254,17 @@ struct CountsOf {
 }
 
 impl CountsOf {
-    /// Offsets in `u64`, with so many bytes of codes per element; `None` when even those overflow.
-    fn layout(&self, stride: u64) -> Option<Layout> {
+    /// Offsets in `u64`, with the codes of the lights; `None` when even those overflow.
+    fn layout(&self, codes: impl Iterator<Item = Code>) -> Option<Layout> {
+        let (mut stride, mut rows) = (0_u64, 0_u64);
+        for code in codes {
+            stride += code.bytes() as u64;
+            rows += u64::from(code == Code::Display8) * ROWS_BYTES as u64;
+        }
         let [n, k] = [u64::from(self.elements), u64::from(self.lights)];
         let names = HEADER_BYTES as u64 + k * LIGHT_BYTES as u64;
-        let codes = names + u64::from(self.names);
+        let knots = names + u64::from(self.names);
+        let codes = knots + rows;
         let tiles = codes.checked_add(n.checked_mul(stride)?)?;
         let surfaces = tiles.checked_add(self.tiles.into())?;
         let faces = surfaces.checked_add(u64::from(self.surfaces) * SURFACE_BYTES as u64)?;
@@ -261,6 +272,7 @@ impl CountsOf {
         let stored = if self.faces > 0 { n } else { 0 };
         Some(Layout {
             names,
+            knots,
             codes,
             tiles,
             surfaces,

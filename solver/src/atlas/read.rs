@@ -6,9 +6,9 @@ use super::tiles::{Block, LARGEST_SIDE, Tiles};
 use super::{
     AtlasElement, AtlasError, AtlasFace, AtlasLight, CHECKSUM_AT, CODE_AT, CURVE_BYTES, CURVES_AT,
     CountsOf, ELEMENT_BYTES, FACE_BYTES, HEADER_BYTES, LARGEST_TILE_CODE, LIGHT_BYTES, MAGIC,
-    NO_LIGHT, NOT_MEASURED, Quantity, SURFACE_BYTES, VERSION, WorstError, checksum,
+    NO_LIGHT, NOT_MEASURED, Quantity, ROW_BYTES, SURFACE_BYTES, VERSION, WorstError, checksum,
 };
-use crate::code::{AllCodes, Code, Curve, ExponentialCodes, Known, Scale};
+use crate::code::{AllCodes, Code, Curve, ExponentialCodes, KNOTS, Known, Scale};
 use crate::color::{Reflectance, Rgb};
 use crate::geometry::Polygon;
 use crate::mesh::Side;
@@ -23,6 +23,8 @@ pub struct Atlas<'a> {
     worst_error: Option<WorstError>,
     lights: &'a [u8],
     names: &'a str,
+    /// Rows of knots.
+    knots: &'a [u8],
     /// Bytes of codes per element.
     stride: usize,
     codes: &'a [u8],
@@ -81,9 +83,8 @@ impl<'a> Atlas<'a> {
             stride += code.bytes();
             is_tiled |= code.is_tiled();
         }
-        let needed = counts
-            .layout(stride as u64)
-            .ok_or(AtlasError::Illegal("size"))?;
+        let codes = (0..counts.lights).filter_map(|tag| code_at(lights, tag));
+        let needed = counts.layout(codes).ok_or(AtlasError::Illegal("size"))?;
         if needed.end != u64::from(header.length) {
             return Err(AtlasError::Illegal("length"));
         }
@@ -98,7 +99,7 @@ impl<'a> Atlas<'a> {
         }
 
         let part = |from: u64, to: u64| bytes.get(from as usize..to as usize).unwrap_or_default();
-        let names = part(needed.names, needed.codes);
+        let names = part(needed.names, needed.knots);
         let names = if K::ONLY_EXPONENTIAL {
             Ok("")
         } else {
@@ -123,6 +124,7 @@ impl<'a> Atlas<'a> {
             worst_error: header.worst_error,
             lights,
             names: names.map_err(|_| AtlasError::Illegal("light name"))?,
+            knots: part(needed.knots, needed.codes),
             stride,
             codes: part(needed.codes, needed.tiles),
             tiles: tiles.transpose()?,
@@ -140,7 +142,7 @@ impl<'a> Atlas<'a> {
     fn check_lights<K: Known>(&self) -> Result<(), AtlasError> {
         let mut named = 0_usize;
         for tag in 0..self.counts.lights {
-            let record = LightRecord::parse(record(self.lights, tag, LIGHT_BYTES));
+            let record = self.light(tag);
             let reaches = |record: &LightRecord| {
                 let mut curves = record.curves.iter().zip(record.last);
                 curves.all(|(curve, last)| curve.reaches::<K>(last))
@@ -196,9 +198,9 @@ impl<'a> Atlas<'a> {
 
     /// The lights, in the order of their tags.
     pub fn lights(&self) -> impl Iterator<Item = AtlasLight<'a>> + use<'a> {
-        let (lights, mut names) = (self.lights, self.names);
+        let (atlas, mut names) = (*self, self.names);
         (0..self.counts.lights).filter_map(move |tag| {
-            let record = LightRecord::parse(record(lights, tag, LIGHT_BYTES))?;
+            let record = atlas.light(tag)?;
             let named = names.split_at_checked(usize::from(record.name_length));
             let (name, rest) = named.unwrap_or_default();
             names = rest;
@@ -219,10 +221,14 @@ impl<'a> Atlas<'a> {
         code_at(self.lights, light)
     }
 
+    fn light(&self, tag: u32) -> Option<LightRecord> {
+        LightRecord::parse(record(self.lights, tag, LIGHT_BYTES), self.knots)
+    }
+
     /// What the codes of a light stand for, and the largest of each channel; `None` without such a light.
     #[must_use]
     pub fn curves(&self, light: u32) -> Option<([Curve; 3], [u16; 3])> {
-        let record = LightRecord::parse(record(self.lights, light, LIGHT_BYTES))?;
+        let record = self.light(light)?;
         Some((record.curves, record.last))
     }
 
@@ -525,7 +531,7 @@ struct LightRecord {
 }
 
 impl LightRecord {
-    fn parse(bytes: &[u8]) -> Option<Self> {
+    fn parse(bytes: &[u8], knots: &[u8]) -> Option<Self> {
         let mut input = Input(bytes);
         let emission = input.rgb().filter(|emission| emission.is_legal())?;
         let [code, 0] = input.take()? else {
@@ -536,9 +542,9 @@ impl LightRecord {
         let error = error(input.u32()?)?;
         input.u16().filter(|reserved| *reserved == 0)?;
         let ((r, last_r), (g, last_g), (b, last_b)) = (
-            curve(code, &mut input)?,
-            curve(code, &mut input)?,
-            curve(code, &mut input)?,
+            curve(code, &mut input, knots)?,
+            curve(code, &mut input, knots)?,
+            curve(code, &mut input, knots)?,
         );
         Some(Self {
             emission,
@@ -551,19 +557,19 @@ impl LightRecord {
     }
 }
 
-/// A curve and its last code.
-fn curve(code: Code, input: &mut Input) -> Option<(Curve, u16)> {
+/// A curve, whose knots stand in some rows, and its last code.
+fn curve(code: Code, input: &mut Input, rows: &[u8]) -> Option<(Curve, u16)> {
     let scale = Scale::from_parts(input.u16()?, i16::from_le_bytes(input.take()?))?;
     let (first, step, last) = (input.u32()?, input.u32()?, input.u16()?);
     let curve = match code {
         Code::Exp8 | Code::Exp8s | Code::Lum8 if first == 0 && step == 0 => {
             Curve::Exponential { scale }
         }
-        Code::Display8 | Code::Tiles if step > 0 => Curve::Display {
+        Code::Display8 if step == 0 => Curve::Knots {
             white: scale,
-            first,
-            step,
+            knots: knots(record(rows, first, ROW_BYTES))?,
         },
+        Code::Tiles if first == 0 && step > 0 => Curve::Display { white: scale, step },
         Code::TilesLog if scale == Scale::ONE && step == 0 => Curve::Logarithmic { first },
         _ => return None,
     };
@@ -573,6 +579,14 @@ fn curve(code: Code, input: &mut Input) -> Option<(Curve, u16)> {
         last == u16::from(u8::MAX)
     };
     is_legal.then_some((curve, last))
+}
+
+/// A row of knots; `None` unless each is above the one before it.
+fn knots(row: &[u8]) -> Option<[u16; KNOTS]> {
+    let (row, _) = row.as_chunks::<2>();
+    let row: &[[u8; 2]; KNOTS] = row.try_into().ok()?;
+    let knots = row.map(u16::from_le_bytes);
+    knots.is_sorted_by(|a, b| a < b).then_some(knots)
 }
 
 /// The code of light `tag` of a table of lights; `None` when there is no such code.

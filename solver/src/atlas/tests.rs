@@ -41,7 +41,7 @@ fn lights() -> [LightEntry<'static>; 4] {
     let emission = Rgb::new(1.0, 2.0, 3.0);
     let scale = |largest| Scale::fitting(largest).unwrap();
     let white = Scale::ONE;
-    let between = |last| Curve::display_between(white, 0.25, 2.0, last).unwrap();
+    let between = Curve::display_between(white, 0.25, 2.0).unwrap();
     let own = |name, code, curves, last| LightEntry {
         name,
         emission,
@@ -51,7 +51,7 @@ fn lights() -> [LightEntry<'static>; 4] {
     };
     [
         LightEntry::exponential("ceiling", emission, Code::Exp8s, scale(1.0)),
-        own("Lämpchen", Code::Display8, [between(255); 3], 255),
+        own("Lämpchen", Code::Display8, [between; 3], 255),
         LightEntry::exponential("grey", emission, Code::Lum8, scale(3.0)),
         own(
             "in tiles",
@@ -221,7 +221,8 @@ fn what_the_format_does_not_allow_is_an_error() {
     let sound = sample();
     let names = "ceilingLämpchengreyin tiles".len();
     let lights = |tag: usize| 56 + tag * 64;
-    let tiles = lights(4) + names + 8 * (3 + 3 + 1);
+    let knots = lights(4) + names;
+    let tiles = knots + 3 * 34 + 8 * (3 + 3 + 1);
     let surfaces = tiles + TILES.len();
     let faces = surfaces + 2 * 52;
     let elements = faces + 3 * 24;
@@ -241,7 +242,7 @@ fn what_the_format_does_not_allow_is_an_error() {
         (48, &[0xff; 8], "error of a light"),
         (lights(0), &minus, "light"),
         (lights(0) + 12, &[9], "code"),
-        (lights(0) + 12, &[2], "light"),
+        (lights(0) + 12, &[2], "length"),
         (lights(0) + 13, &[1], "light"),
         (lights(0) + 14, &[0], "light name"),
         (lights(0) + 16, &nan, "light"),
@@ -250,7 +251,11 @@ fn what_the_format_does_not_allow_is_an_error() {
         (lights(0) + 22, &[0, 1], "light"),
         (lights(0) + 26, &[1], "light"),
         (lights(0) + 34, &[254], "light"),
-        (lights(1) + 30, &[0; 4], "light"),
+        (lights(1) + 26, &[3], "light"),
+        (lights(1) + 30, &[1], "light"),
+        (knots + 2, &[0; 2], "light"),
+        (lights(3) + 26, &[1], "light"),
+        (lights(3) + 30, &[0; 4], "light"),
         (lights(3) + 35, &[0x80], "light"),
         (lights(3) + 30, &[0xff; 4], "light"),
         (lights(4), &[0xff], "light name"),

@@ -101,8 +101,8 @@ impl Contents<'_> {
 /// # Errors
 /// [`AtlasError::Unfit`] for counts that the format cannot hold.
 pub fn size(contents: &Contents) -> Result<usize, AtlasError> {
-    let stride = contents.lights.iter().map(|l| l.code.bytes() as u64);
-    let layout = contents.counts()?.layout(stride.sum());
+    let codes = contents.lights.iter().map(|light| light.code);
+    let layout = contents.counts()?.layout(codes);
     layout
         .filter(|layout| layout.end <= u64::from(u32::MAX))
         .and_then(|layout| usize::try_from(layout.end).ok())
@@ -210,6 +210,7 @@ fn error_bits(error: Option<f32>) -> Result<u32, AtlasError> {
 
 fn lights(contents: &Contents, output: &mut Output) -> Result<(), AtlasError> {
     let lights = contents.lights;
+    let mut row = 0;
     for (light, tag) in lights.iter().zip(0..) {
         if !light.emission.is_legal() {
             return Err(AtlasError::Unfit(
@@ -227,20 +228,36 @@ fn lights(contents: &Contents, output: &mut Output) -> Result<(), AtlasError> {
         output.u32(error_bits(error.copied())?)?;
         output.put(&[0, 0])?;
         for (curve, last) in light.curves.iter().zip(light.last) {
-            put_curve(light.code, *curve, last, output)?;
+            put_curve(light.code, *curve, last, row, output)?;
+            row += u32::from(matches!(curve, Curve::Knots { .. }));
         }
     }
     lights
         .iter()
-        .try_for_each(|light| output.put(light.name.as_bytes()))
+        .try_for_each(|light| output.put(light.name.as_bytes()))?;
+    let mut curves = lights.iter().flat_map(|light| light.curves);
+    curves.try_for_each(|curve| match curve {
+        Curve::Knots { knots, .. } => knots
+            .iter()
+            .try_for_each(|knot| output.put(&knot.to_le_bytes())),
+        _ => Ok(()),
+    })
 }
 
-fn put_curve(code: Code, curve: Curve, last: u16, output: &mut Output) -> Result<(), AtlasError> {
+/// A curve; one with knots has those in this row.
+fn put_curve(
+    code: Code,
+    curve: Curve,
+    last: u16,
+    row: u32,
+    output: &mut Output,
+) -> Result<(), AtlasError> {
     let (scale, first, step) = match (code, curve) {
         (Code::Exp8 | Code::Exp8s | Code::Lum8, Curve::Exponential { scale }) => (scale, 0, 0),
-        (Code::Display8 | Code::Tiles, Curve::Display { white, first, step }) => {
-            (white, first, step)
+        (Code::Display8, Curve::Knots { white, knots }) if knots.is_sorted_by(|a, b| a < b) => {
+            (white, row, 0)
         }
+        (Code::Tiles, Curve::Display { white, step }) => (white, 0, step),
         (Code::TilesLog, Curve::Logarithmic { first }) => (Scale::ONE, first, 0),
         _ => return Err(AtlasError::Unfit("a code with the curve of another one")),
     };

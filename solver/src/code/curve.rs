@@ -1,11 +1,13 @@
 //! The map between the whole numbers that are stored and the values that they stand for.
 //!
 //! * Exponential: see [`decode`](super::decode), over a scale.
-//! * Display: `x = w f(C)`, `C = first + step c` in units of 2^-12 display codes, with a white `w`,
+//! * Display: `x = w f(C)`, `C = step c` in units of 2^-12 display codes, with a white `w`,
 //!   `f(C)` the linear value of the sRGB code `C` (IEC 61966-2-1) up to 255, and
 //!   `f(C) = e^((C - 255) / K)` above, `K = 255 * 1.055 / 2.4 = 112.09`, which continues it with the
 //!   same slope. `f` is *defined* by two tables, linear in between, so that a decoder needs no float: it is within
 //!   7e-4 of the formula, relative to the value (the largest distance is at `C = 11`).
+//! * Knots: the same `f`, but `C` is linear between 17 knots, which stand at the codes 0, 16, ..., 256 and are whole numbers
+//!   of sixteenths of a display code: every part of 16 codes has steps of its own.
 //! * Logarithmic: `x = 0` for code 0, else `x = 2^((first + c - 1) / N - 200)`, `N = 42` steps an
 //!   octave, so that every positive float has a code.
 //!
@@ -35,6 +37,15 @@ const LOG_BEGIN: i32 = -200;
 
 /// Units of the display curve in a display code.
 const UNITS: u32 = 1 << 12;
+
+/// Knots of a curve of 256 codes.
+pub const KNOTS: usize = 17;
+
+/// Codes from a knot to the next.
+pub const KNOT_CODES: u16 = 16;
+
+/// Units of a knot in a display code.
+pub const KNOT_UNITS: u16 = 16;
 
 /// Display codes at white.
 const WHITE: u32 = 255;
@@ -74,10 +85,15 @@ pub enum Curve {
     Display {
         /// The value at 255 display codes.
         white: Scale,
-        /// Code 0, in 2^-12 display codes.
-        first: u32,
         /// From a code to the next, in 2^-12 display codes; at least 1.
         step: u32,
+    },
+    /// Uniform in display codes between knots.
+    Knots {
+        /// The value at 255 display codes.
+        white: Scale,
+        /// Where the codes 0, 16, ..., 256 lie, in 1/16 display code; each above the one before it.
+        knots: [u16; KNOTS],
     },
     /// Uniform in logarithms, and zero.
     Logarithmic {
@@ -95,31 +111,35 @@ impl Curve {
             .contains(&units)
             .then_some(Self::Display {
                 white,
-                first: 0,
                 step: units as u32,
             })
     }
 
-    /// Units of a display curve, its first code or its step, in display codes.
+    /// The step of a display curve, in display codes.
     #[must_use]
     pub fn display_codes(units: u32) -> f32 {
         units as f32 / UNITS as f32
     }
 
-    /// The display curve on which code 0 is `smallest`, or below by rounding, and code `last` is
-    /// `largest` or above; `None` unless `0 <= smallest <= largest` and the curve reaches that far.
+    /// Knots at the same distance, with code 0 at `smallest`, or below by rounding, and code 255 at `largest` or above;
+    /// `None` unless `0 <= smallest <= largest` and the curve reaches that far.
     #[must_use]
-    pub fn display_between(white: Scale, smallest: f32, largest: f32, last: u16) -> Option<Self> {
-        let units = |value: f32| display_code(value / white.value()) * UNITS as f32;
-        let (low, high) = (units(smallest), units(largest));
-        if !(smallest >= 0.0 && low <= high && high < 2_147_483_648.0) || last == 0 {
+    pub fn display_between(white: Scale, smallest: f32, largest: f32) -> Option<Self> {
+        let units = |value: f32| display_code(value / white.value()) * f32::from(KNOT_UNITS);
+        let (low, high) = (math::floor(units(smallest)), math::ceil(units(largest)));
+        // Code 255 is a sixteenth of a part below the last knot.
+        let parts = KNOTS as f32 - 1.0;
+        let distance = math::ceil((high - low) / (parts - 1.0 / f32::from(KNOT_CODES))).max(1.0);
+        if !(smallest >= 0.0 && low <= high && low + parts * distance <= f32::from(u16::MAX)) {
             return None;
         }
-        let first = math::floor(low) as u32;
-        // A unit more outweighs the rounding of `high`, which has 24 bits.
-        let span = (high - first as f32) * (1.0 + f32::EPSILON) + 1.0;
-        let step = math::ceil(span / f32::from(last)) as u32;
-        Some(Self::Display { white, first, step })
+        let mut knot = low as u16;
+        let knots = core::array::from_fn(|_| {
+            let own = knot;
+            knot = knot.saturating_add(distance as u16);
+            own
+        });
+        Some(Self::Knots { white, knots })
     }
 
     /// The logarithmic curve whose code 1 is at or below `smallest`, a positive float.
@@ -146,7 +166,9 @@ impl Curve {
     #[must_use]
     pub const fn scale(&self) -> Scale {
         match *self {
-            Self::Exponential { scale } | Self::Display { white: scale, .. } => scale,
+            Self::Exponential { scale }
+            | Self::Display { white: scale, .. }
+            | Self::Knots { white: scale, .. } => scale,
             Self::Logarithmic { .. } => Scale::ONE,
         }
     }
@@ -156,10 +178,8 @@ impl Curve {
     pub fn magnitude(&self, code: u16) -> Magnitude {
         match *self {
             Self::Exponential { .. } => exponential(code),
-            Self::Display { first, step, .. } => {
-                let units = u64::from(first) + u64::from(step) * u64::from(code);
-                display_magnitude(u32::try_from(units).unwrap_or(u32::MAX))
-            }
+            Self::Display { step, .. } => display_magnitude(step.saturating_mul(code.into())),
+            Self::Knots { ref knots, .. } => display_magnitude(knot_units(knots, byte(code))),
             Self::Logarithmic { first } => {
                 let Some(steps) = code.checked_sub(1) else {
                     return Magnitude {
@@ -189,7 +209,7 @@ impl Curve {
     pub fn decode(&self, code: u16) -> f32 {
         match self {
             Self::Exponential { scale } => decode(byte(code)) * scale.value(),
-            Self::Display { .. } | Self::Logarithmic { .. } => {
+            Self::Display { .. } | Self::Knots { .. } | Self::Logarithmic { .. } => {
                 self.magnitude(code).value() * self.factor()
             }
         }
@@ -204,9 +224,20 @@ impl Curve {
             Self::Exponential { scale } => {
                 return u16::from(encode(value / scale.value())).min(last);
             }
-            Self::Display { white, first, step } => {
-                let units = display_code(value / white.value()) * UNITS as f32;
-                (units - first as f32) / step as f32
+            Self::Display { white, step } => {
+                display_code(value / white.value()) * UNITS as f32 / step as f32
+            }
+            Self::Knots { white, ref knots } => {
+                let units = display_code(value / white.value()) * f32::from(KNOT_UNITS);
+                let mut parts = knots.windows(2).zip(0_u16..);
+                let part = parts.find_map(|(ends, part)| match *ends {
+                    [from, to] if units < f32::from(to) => {
+                        let within = (units - f32::from(from)) / (f32::from(to) - f32::from(from));
+                        Some((f32::from(part) + within) * f32::from(KNOT_CODES))
+                    }
+                    _ => None,
+                });
+                part.unwrap_or(f32::from(last))
             }
             Self::Logarithmic { .. } if value == 0.0 => return 0,
             Self::Logarithmic { first } => {
@@ -266,6 +297,16 @@ pub fn display_code(u: f32) -> f32 {
     } else {
         255.0 + CODES_PER_E * math::ln(u)
     }
+}
+
+/// Where a code lies between its knots, in 2^-12 display codes.
+fn knot_units(knots: &[u16; KNOTS], code: u8) -> u32 {
+    const UNITS_PER_CODE: u32 = UNITS / (KNOT_UNITS as u32 * KNOT_CODES as u32);
+    let (part, within) = (u16::from(code) / KNOT_CODES, u16::from(code) % KNOT_CODES);
+    let knot = |number: usize| u32::from(knots.get(number).copied().unwrap_or(u16::MAX));
+    let (from, to) = (knot(part.into()), knot(usize::from(part) + 1));
+    let whole = from * u32::from(KNOT_CODES) + to.saturating_sub(from) * u32::from(within);
+    whole * UNITS_PER_CODE
 }
 
 /// `f(C)` for `C` in 2^-12 display codes.
@@ -347,7 +388,7 @@ mod tests {
         let curves = [
             Curve::Exponential { scale: white },
             Curve::display(white, 1.85).unwrap(),
-            Curve::display_between(white, 0.01, 99.0, 255).unwrap(),
+            Curve::display_between(white, 0.01, 99.0).unwrap(),
             Curve::logarithmic(1e-6).unwrap(),
         ];
         for curve in curves {
@@ -409,7 +450,7 @@ mod tests {
         ) {
             let scale = Scale::at_least(white).unwrap();
             let (smallest, largest) = (smallest * white, headroom * white);
-            let curve = Curve::display_between(scale, smallest, largest, 255).unwrap();
+            let curve = Curve::display_between(scale, smallest, largest).unwrap();
             prop_assert!(curve.decode(0) <= smallest * 1.001 && curve.decode(255) >= largest * 0.9999, "{curve:?}");
             let value = smallest + at * at * at * (largest - smallest);
             let code = curve.encode(value, 255);
@@ -425,9 +466,9 @@ mod tests {
         assert_eq!(Curve::logarithmic(f32::NAN), None);
         assert_eq!(Curve::display(white, 0.0), None);
         assert_eq!(Curve::display(white, f32::INFINITY), None);
-        assert_eq!(Curve::display_between(white, -1.0, 1.0, 255), None);
-        assert_eq!(Curve::display_between(white, 2.0, 1.0, 255), None);
-        assert_eq!(Curve::display_between(white, 0.0, f32::NAN, 255), None);
-        assert_eq!(Curve::display_between(white, 0.0, f32::INFINITY, 255), None);
+        assert_eq!(Curve::display_between(white, -1.0, 1.0), None);
+        assert_eq!(Curve::display_between(white, 2.0, 1.0), None);
+        assert_eq!(Curve::display_between(white, 0.0, f32::NAN), None);
+        assert_eq!(Curve::display_between(white, 0.0, f32::INFINITY), None);
     }
 }

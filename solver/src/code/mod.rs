@@ -10,7 +10,7 @@
 //! | `exp8` | 1:1410, one scale for all | 0.002 s to 0.69 s, all of it above 5.54 s | 0.002 s: dark | table of 256 |
 //! | `exp8s` | 1:1410, largest value at the top | 0.002 s to 0.69 s | 0.002 s: dark | the same table |
 //! | `lum8` | 1:1410 of luminance, largest at the top | as `exp8s`, and all colour | 0.002 s: dark | the same table, once for three channels |
-//! | `display8` | smallest to largest value, any ratio | half a step, `(C(largest) - C(smallest)) / 510` display codes | nothing, or half a step if a value is 0 | table of 256 per light and channel |
+//! | `display8` | smallest to largest value, any ratio | half a step: with equal ones `(C(largest) - C(smallest)) / 510` display codes | nothing, or half a step if a value is 0 | table of 256 per light and channel |
 //! | `tiles` | any, steps of 77.7 / N display codes | half a step | half a step: dark | bits, prediction, [`curve`](Curve) |
 //! | `tiles-log` | all positive floats, 42 steps an octave | 0.826 % of the value | nothing | bits, prediction, [`curve`](Curve) |
 //!
@@ -25,7 +25,9 @@ mod tables;
 
 use core::fmt;
 
-pub use curve::{Curve, LOG_STEPS, Magnitude, display_code, srgb_linear};
+pub use curve::{
+    Curve, KNOT_CODES, KNOT_UNITS, KNOTS, LOG_STEPS, Magnitude, display_code, srgb_linear,
+};
 pub use exponential::{
     DECODED, DECODED_BITS, LARGEST, SATURATED, decode, decode_fixed, encode, error_bound,
 };
@@ -39,7 +41,7 @@ pub enum Code {
     Exp8,
     /// Exponential with one scale per light, which puts its largest value on code 254.
     Exp8s,
-    /// Uniform in display steps up to a white of each light and channel, logarithmic above.
+    /// Display steps up to a white of each light and channel, logarithmic ones above, in 16 parts of steps of their own.
     Display8,
     /// One exponential code for the luminance; the colour is that of the light alone.
     Lum8,

@@ -27,7 +27,7 @@ fn atlas_bytes(code: Code) -> Vec<u8> {
         let entry = LightEntry::exponential("", Rgb::WHITE, code, scale);
         match code {
             Code::Display8 => LightEntry {
-                curves: [Curve::display_between(scale, 0.0, largest, 255).unwrap(); 3],
+                curves: [Curve::display_between(scale, 0.0, largest).unwrap(); 3],
                 ..entry
             },
             _ => entry,

@@ -31,7 +31,6 @@ fn atlas_bytes(lights: u32) -> Vec<u8> {
                     Scale::at_least(power(light)).unwrap(),
                     0.0,
                     largest,
-                    255,
                 )
                 .unwrap(); 3],
                 ..exponential(Code::Exp8s)
