@@ -68,9 +68,10 @@ uint32_t instructions(void) {
 #define PAINT 0x5ac396e1u
 
 static void paint_stack(void) {
-    uint32_t mark;
-    for (volatile uint32_t *word = bss_end; word < &mark - 16; ++word)
-        *word = PAINT;
+    /* Well below the frames that are in use. */
+    const uintptr_t end = (uintptr_t)stack_top - 256;
+    for (uintptr_t word = (uintptr_t)bss_end; word < end; word += sizeof(uint32_t))
+        REGISTER(word) = PAINT;
 }
 
 /* Bytes of the stack that were in use at some time. */
