@@ -46,13 +46,13 @@ type Codes = [f64; 3];
 const PARTS: [(&str, f64); 5] = [
     // 0.40, of which the noise of the reference is a part.
     ("bake", 0.6),
-    // 12.05: one value for an element, through which edges of shadows run, and the dark codes are narrow.
+    // 12.03: one value for an element, through which edges of shadows run, and the dark codes are narrow.
     ("mesh", 13.0),
-    // 0.30: codes are a display code apart or less, and sqrt(1 / 12) of it is 0.29.
-    ("packing", 0.4),
-    // 2.06: steps of 8.2, 4.0 and 8.2 codes make 2.4, 1.2 and 2.4 each by sqrt(1 / 12), 2.07 in all.
+    // 0.36: codes are about a display code apart, and sqrt(1 / 12) of it is 0.29.
+    ("packing", 0.5),
+    // 2.05: steps of 8.2, 4.0 and 8.2 codes make 2.4, 1.2 and 2.4 each by sqrt(1 / 12), 2.07 in all.
     ("RGB565", 2.2),
-    // 1.50: three channels of a hundred fall to the other side of a rounding.
+    // 1.46: three channels of a hundred fall to the other side of a rounding.
     ("integers", 1.7),
 ];
 

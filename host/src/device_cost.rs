@@ -120,8 +120,8 @@ const LUM_IN_BATCHES: Model = Model {
 
 const fn any(core: Core) -> Model {
     let (code_of_light, code) = match core {
-        Core::M0 => (900.0, 38_000),
-        _ => (509.0, 38_000),
+        Core::M0 => (900.0, 35_500),
+        _ => (509.0, 35_500),
     };
     Model {
         element: 25.0,
