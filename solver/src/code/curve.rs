@@ -155,33 +155,32 @@ impl Curve {
     }
 
     /// Where a code lies on a display curve, in 2^-12 display codes; 0 on others.
+    // Firmware has no room for a copy at every place that asks.
+    #[inline(never)]
     fn units(&self, code: u16) -> u32 {
         match *self {
             Self::Display { step, .. } => step.saturating_mul(code.into()),
-            Self::Parts { first, .. } => {
+            Self::Parts {
+                first,
+                unit,
+                ref steps,
+                ..
+            } => {
                 let (part, within) = (byte(code) >> 4, byte(code) & 15);
-                let before: u32 = (0..part).map(|part| self.part_step(part)).sum();
-                let first = u32::from(first) * (UNITS / 16);
-                let before = before * u32::from(PART_CODES);
-                first + before + self.part_step(part) * u32::from(within)
+                let pairs = usize::from(part / 2);
+                let both = |pair: &u8| part_step(pair & 15) + part_step(pair >> 4);
+                let mut before: u32 = steps.iter().take(pairs).map(both).sum();
+                let pair = steps.get(pairs).copied().unwrap_or(0);
+                let mut own = part_step(pair & 15);
+                if part % 2 == 1 {
+                    before += own;
+                    own = part_step(pair >> 4);
+                }
+                let steps = before * u32::from(PART_CODES) + own * u32::from(within);
+                u32::from(first) * (UNITS / 16) + (steps << unit.min(LARGEST_PART_UNIT))
             }
             Self::Exponential { .. } | Self::Logarithmic { .. } => 0,
         }
-    }
-
-    /// The step of a part, in 2^-12 display codes; 0 without parts.
-    fn part_step(&self, part: u8) -> u32 {
-        let Self::Parts { unit, steps, .. } = self else {
-            return 0;
-        };
-        let pair = steps.get(usize::from(part / 2)).copied().unwrap_or(0);
-        let place = if part.is_multiple_of(2) {
-            pair & 15
-        } else {
-            pair >> 4
-        };
-        let step = PART_STEPS.get(usize::from(place)).copied().unwrap_or(0);
-        u32::from(step) << (*unit).min(LARGEST_PART_UNIT)
     }
 
     /// The logarithmic curve whose code 1 is at or below `smallest`, a positive float.
@@ -274,8 +273,8 @@ impl Curve {
                     (0_u8..16).take_while(|part| self.units(16 * u16::from(*part)) as f32 <= units);
                 let part = parts.last().unwrap_or(0);
                 let begin = 16 * u16::from(part);
-                let within = (units - self.units(begin) as f32) / self.part_step(part) as f32;
-                f32::from(begin) + within
+                let own = (self.units(begin + 1) - self.units(begin)) as f32;
+                f32::from(begin) + (units - self.units(begin) as f32) / own
             }
             Self::Logarithmic { .. } if value == 0.0 => return 0,
             Self::Logarithmic { first } => {
@@ -335,6 +334,15 @@ pub fn display_code(u: f32) -> f32 {
     } else {
         255.0 + CODES_PER_E * math::ln(u)
     }
+}
+
+/// A step of a part by its place, in units.
+fn part_step(place: u8) -> u32 {
+    PART_STEPS
+        .get(usize::from(place))
+        .copied()
+        .unwrap_or(0)
+        .into()
 }
 
 /// `f(C)` for `C` in 2^-12 display codes.
