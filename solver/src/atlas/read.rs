@@ -241,6 +241,12 @@ impl<'a> Atlas<'a> {
         self.codes
     }
 
+    /// The codes of every element for its lights, where each is three bytes; `None` where one is not.
+    pub(crate) fn triples(&self) -> Option<impl Iterator<Item = &'a [[u8; 3]]> + use<'a>> {
+        let rows = self.codes.chunks_exact(self.stride.max(1));
+        (self.stride == 3 * self.counts.lights as usize).then(|| rows.map(|row| row.as_chunks().0))
+    }
+
     /// Bytes of all codes, those in tiles included.
     #[must_use]
     pub const fn code_bytes(&self) -> usize {

@@ -116,6 +116,15 @@ impl<'a, T: Copy + Default> CodeTable<'a, T> {
         }
     }
 
+    /// The same values where every code is a byte: `[light][channel][code]`; nothing where not.
+    fn of_bytes(&self) -> &[[[T; 256]; 3]] {
+        if self.levels == 256 {
+            self.values.as_chunks().0.as_chunks().0
+        } else {
+            &[]
+        }
+    }
+
     fn get(&self, light: u32, channel: usize, code: u16) -> T {
         let at = (light as usize * 3 + channel) * self.levels + usize::from(code);
         self.values.get(at).copied().unwrap_or_default()
