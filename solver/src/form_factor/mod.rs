@@ -189,13 +189,12 @@ fn fill_with<'s, V: Visibility>(
     row.fill(0.0);
     let mut near: Option<(u32, View)> = None;
     for (value, element) in row.iter_mut().zip(elements) {
-        // Neighbours are of the same patch, for which what stands between is looked up once.
-        let known = near.take().filter(|(patch, _)| *patch == element.patch);
-        let look_up = || {
-            let patch = mesh.patch_polygon(element.patch)?;
-            Some((element.patch, shooter.seen_by(&patch, visibility)))
-        };
-        near = known.or_else(look_up);
+        // Neighbours are of the same patch, for which what stands between is looked up once, and stays where it is: it is large.
+        let is_known = |(patch, _): &(u32, View)| *patch == element.patch;
+        if !near.as_ref().is_some_and(is_known) {
+            let patch = mesh.patch_polygon(element.patch);
+            near = patch.map(|patch| (element.patch, shooter.seen_by(&patch, visibility)));
+        }
         let receiver = mesh.element_polygon(element).map(Receiver::new);
         if let (Some((_, view)), Some(receiver)) = (&near, receiver) {
             *value = factor(view, &receiver, visibility);
