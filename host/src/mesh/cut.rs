@@ -34,7 +34,7 @@ const ROUNDINGS: f32 = 4.0;
 /// Sample points along an edge of an element.
 const PER_ELEMENT: f32 = 2.0;
 
-/// Most rows, and most columns, of sample points.
+/// Most rows, and most columns, of sample points, and most feet of a wall.
 const MOST_ROWS: u32 = 256;
 
 /// Rows and columns around the foot of a wall in which its sample points are joined to others.
@@ -138,7 +138,7 @@ struct Cutter<'a> {
     surroundings: OnceLock<Option<Surroundings<'a>>>,
 }
 
-/// The line on a surface from which a wall rises, at most an element long.
+/// The line on a surface from which a wall rises: an element long, or [`MOST_ROWS`] of one wall.
 struct Foot {
     middle: Vec3,
     /// Across it, on the surface; a unit vector.
@@ -266,7 +266,8 @@ impl Cutter<'_> {
         let across = up.cross(b - a).normalize_or_zero();
         // Down the wall, to where the planes meet.
         let down = (wall.normal() * cosine - up) * (touch / square);
-        let count = ((b - a).length() / self.spacing.element).ceil().max(1.0);
+        let count = ((b - a).length() / self.spacing.element).ceil();
+        let count = count.clamp(1.0, MOST_ROWS as f32);
         for part in 0..count as u32 {
             let point = a + (b - a) * ((part as f32 + 0.5) / count);
             let beside = [1.0, -1.0].map(|side| point + across * (side * 2.0 * touch));
