@@ -20,7 +20,11 @@ fuzz_target!(|bytes: &[u8]| {
         Ok(layers) => {
             let (_, first) = layers.first().expect("no file without a light");
             let size = (first.width, first.height);
-            assert!(layers.iter().all(|(_, image)| (image.width, image.height) == size));
+            assert!(
+                layers
+                    .iter()
+                    .all(|(_, image)| (image.width, image.height) == size)
+            );
         }
         Err(error) => assert!(!error.to_string().contains('\n'), "{error}"),
     }

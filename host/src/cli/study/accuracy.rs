@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use indicatif::ProgressBar;
 use serde_json::{Value, json};
 
@@ -17,11 +17,7 @@ pub fn run(folder: &Path) -> Result<Value> {
     })?;
     bar.finish_and_clear();
 
-    let mut table = csv::Writer::from_writer(Vec::new());
-    for line in accuracy.lines() {
-        table.serialize(line).context("accuracy.csv")?;
-    }
-    let mut files = vec![("accuracy.csv".to_owned(), table.into_inner()?)];
+    let mut files = vec![("accuracy.csv".to_owned(), accuracy.csv()?)];
     let charts = accuracy.charts()?.into_iter();
     files.extend(charts.map(|(name, svg)| (format!("accuracy_{name}"), svg.into_bytes())));
     let mut written: Vec<PathBuf> = Vec::new();

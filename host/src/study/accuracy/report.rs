@@ -167,6 +167,18 @@ impl Accuracy {
         self.measured.iter().map(Line::from).collect()
     }
 
+    /// The table as `accuracy.csv` holds it.
+    ///
+    /// # Errors
+    /// What the writer of CSV says.
+    pub fn csv(&self) -> anyhow::Result<Vec<u8>> {
+        let mut table = csv::Writer::from_writer(Vec::new());
+        for line in self.lines() {
+            table.serialize(line)?;
+        }
+        Ok(table.into_inner()?)
+    }
+
     /// What paths say of the dense solutions themselves.
     #[must_use]
     pub fn references(&self) -> Vec<Value> {
