@@ -63,7 +63,7 @@ pub(super) fn gather(
         hits.cast(&rays, &dark);
         if hits.passes() as u32 == next_look.min(passes) {
             light.bounce(&mesh, &hits, job.settings.residual);
-            if light.error() <= job.settings.noise {
+            if light.error(&mesh, &hits) <= job.settings.noise {
                 break;
             }
             next_look *= 2;
@@ -142,8 +142,6 @@ struct Block {
     /// Power of lamps that have not been shot, W.
     waiting: [f32; LANES],
     residuals: [f32; LANES],
-    /// Estimated relative L1 errors.
-    errors: [f32; LANES],
 }
 
 impl Light {
@@ -156,7 +154,6 @@ impl Light {
             emitted: [0.0; LANES],
             waiting: [0.0; LANES],
             residuals: [1.0; LANES],
-            errors: [1.0; LANES],
         };
         let mut light = Self {
             lights,
@@ -195,7 +192,7 @@ impl Light {
         }
     }
 
-    /// Solves for the bounces along the rays there are, and estimates what error they leave.
+    /// Solves for the bounces along the rays there are.
     fn bounce(&mut self, mesh: &OwnedMesh, hits: &Hits, residual: f32) {
         if self.passes > 0 && self.passes == hits.passes() {
             return;
@@ -208,28 +205,33 @@ impl Light {
                 (block.indirect, block.left) = (bounced.indirect, bounced.left);
             }
             block.measure(mesh);
-            block.estimate(mesh, hits);
         }
     }
 
     /// The largest residual of all lights.
     fn residual(&self) -> f32 {
-        let residuals = self.blocks.iter().flat_map(|block| block.residuals);
-        residuals.take(self.lights).fold(0.0, f32::max)
+        self.residuals().into_iter().fold(0.0, f32::max)
     }
 
     /// The largest estimated error of all lights.
-    fn error(&self) -> f32 {
-        let errors = self.blocks.iter().flat_map(|block| block.errors);
-        errors.take(self.lights).fold(0.0, f32::max)
+    fn error(&self, mesh: &OwnedMesh, hits: &Hits) -> f32 {
+        let errors = errors(mesh, hits, &self.contributions(), &self.residuals());
+        errors.into_iter().fold(0.0, f32::max)
+    }
+
+    fn contributions(&self) -> Vec<Rgb> {
+        let irradiance: Vec<_> = self.blocks.iter().map(Block::irradiance).collect();
+        by_element(&irradiance, self.lights)
+    }
+
+    fn residuals(&self) -> Vec<f32> {
+        let residuals = self.blocks.iter().flat_map(|block| block.residuals);
+        residuals.take(self.lights).collect()
     }
 
     fn solved(self, rows: u32, mesh: OwnedMesh, hits: &Hits, settings: &Settings) -> Solved {
-        let irradiance: Vec<_> = self.blocks.iter().map(Block::irradiance).collect();
         let direct: Vec<_> = self.blocks.iter().map(|b| b.direct.clone()).collect();
-        let residuals = self.blocks.iter().flat_map(|block| block.residuals);
-        let residuals: Vec<f32> = residuals.take(self.lights).collect();
-        let contributions = by_element(&irradiance, self.lights);
+        let (contributions, residuals) = (self.contributions(), self.residuals());
         Solved {
             errors: errors(&mesh, hits, &contributions, &residuals),
             contributions,
@@ -274,15 +276,6 @@ impl Block {
         for ((residual, unshot), emitted) in self.residuals.iter_mut().zip(unshot).zip(self.emitted)
         {
             *residual = if emitted > 0.0 { unshot / emitted } else { 0.0 };
-        }
-    }
-
-    /// Relative L1 errors: what the scatter of the rays leaves, and what has not been distributed.
-    fn estimate(&mut self, mesh: &OwnedMesh, hits: &Hits) {
-        let noise = hits.noise(&mesh.view(), &self.irradiance());
-        let errors = self.errors.iter_mut().zip(noise).zip(self.residuals);
-        for ((error, noise), residual) in errors {
-            *error = noise + residual;
         }
     }
 }

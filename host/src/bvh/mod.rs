@@ -85,12 +85,16 @@ impl Boundable for Bounded {
 impl Bounded {
     /// `farthest` is the largest coordinate of any segment's end.
     fn new(polygon: &Polygon, farthest: f32) -> Self {
+        let (_, tolerance) = polygon.height(Vec3::splat(farthest));
+        Self::widened(polygon, 2.0 * tolerance)
+    }
+
+    fn widened(polygon: &Polygon, margin: f32) -> Self {
         let mut bounds = Aabb::empty();
         for vertex in polygon.vertices() {
             bounds.extend(Vec3A::from(*vertex));
         }
-        let (_, tolerance) = polygon.height(Vec3::splat(farthest));
-        let margin = Vec3A::splat(2.0 * tolerance);
+        let margin = Vec3A::splat(margin);
         Self(Aabb::new(bounds.min - margin, bounds.max + margin))
     }
 }
@@ -211,20 +215,7 @@ impl Bvh {
 
     /// Numbers of the surfaces whose boxes come within a distance of a polygon's, in order.
     pub(crate) fn near(&self, polygon: &Polygon, distance: f32) -> Vec<u32> {
-        let mut bounds = Aabb::empty();
-        for vertex in polygon.vertices() {
-            bounds.extend(Vec3A::from(*vertex));
-        }
-        let margin = Vec3A::splat(distance);
-        let bounds = Aabb::new(bounds.min - margin, bounds.max + margin);
-        let mut near = Vec::new();
-        visit_leaves(
-            &self.tree,
-            |node| !node.intersect_aabb(&bounds),
-            |leaf| near.extend_from_slice(&self.surfaces[leaf]),
-        );
-        near.sort_unstable();
-        near
+        met_by(&self.tree, &Bounded::widened(polygon, distance))
     }
 
     /// What stands between two regions, looked up once for many pairs of points in them.
@@ -263,6 +254,18 @@ impl<'a> Narrowed<'a> {
                 .collect(),
         }
     }
+}
+
+/// Numbers of the surfaces whose leaves meet a box, in order.
+fn met_by(tree: &Bvh2, bounds: &Bounded) -> Vec<u32> {
+    let mut met = Vec::new();
+    visit_leaves(
+        tree,
+        |node| !node.intersect_aabb(&bounds.0),
+        |leaf| met.extend_from_slice(&tree.primitive_indices[leaf]),
+    );
+    met.sort_unstable();
+    met
 }
 
 /// Visits what lies in the leaves that no box around them keeps off.

@@ -1,13 +1,12 @@
 //! Surfaces that lie on top of others, in their planes ([`covers`]): few, and found once.
 
 use glam::Vec3;
-use obvhs::Boundable;
 use obvhs::bvh2::Bvh2;
 use relume::geometry::Polygon;
 use relume::scene::Surface;
 use relume::visibility::covers;
 
-use super::{Bounded, Hit, visit_leaves};
+use super::{Bounded, Hit, met_by};
 
 /// One surface on top of another one.
 struct Stack {
@@ -19,7 +18,6 @@ struct Stack {
 }
 
 /// All of them, by the number of the one below.
-#[derive(Default)]
 pub(super) struct Stacks(Vec<Stack>);
 
 impl Stacks {
@@ -27,14 +25,7 @@ impl Stacks {
     pub(super) fn new(surfaces: &[Surface], tree: &Bvh2) -> Self {
         let mut stacks = Vec::new();
         for (bottom, number) in surfaces.iter().zip(0..) {
-            let bounds = Bounded::new(bottom.polygon(), 0.0).aabb();
-            let mut near = Vec::new();
-            visit_leaves(
-                tree,
-                |node| !node.intersect_aabb(&bounds),
-                |leaf| near.extend(tree.primitive_indices[leaf].iter().copied()),
-            );
-            near.sort_unstable();
+            let near = met_by(tree, &Bounded::new(bottom.polygon(), 0.0));
             let normal = bottom.polygon().normal();
             for facing in [normal, -normal] {
                 let tops = near.iter().map(|top| (*top, &surfaces[*top as usize]));

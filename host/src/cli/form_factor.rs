@@ -125,8 +125,8 @@ fn parse_case(number: usize, case: &Value) -> Result<Case> {
     let blockers =
         blockers.map(|(k, value)| polygon(value).with_context(|| place(&format!("blocker {k}"))));
     let (from, to) = (outline("from")?, outline("to")?);
-    let (small, large) = (size(&from).min(size(&to)), size(&from).max(size(&to)));
-    if small < large / LARGEST_RATIO {
+    let sizes = [from.extent(), to.extent()];
+    if sizes[0].min(sizes[1]) < sizes[0].max(sizes[1]) / LARGEST_RATIO {
         bail!(
             "case {number} `{name}`: one polygon is {LARGEST_RATIO:e} times as large as the other one; divide it"
         );
@@ -137,13 +137,6 @@ fn parse_case(number: usize, case: &Value) -> Result<Case> {
         to,
         blockers: blockers.collect::<Result<_>>()?,
     })
-}
-
-/// The longest way from its first vertex.
-fn size(polygon: &ConvexPolygon) -> f64 {
-    let vertices = polygon.vertices();
-    let lengths = vertices.iter().map(|v| (*v - vertices[0]).length());
-    lengths.fold(0.0, f64::max)
 }
 
 fn polygon(value: &Value) -> Result<ConvexPolygon> {

@@ -20,7 +20,7 @@ use relume::geometry::{Polygon, clip};
 use relume::mesh::{Side, Spacing, is_face};
 use relume::scene::{Scene, SceneError, Surface};
 
-use super::reach::{Place, Surroundings};
+use super::reach::{Place, Surroundings, WALKS};
 use crate::bvh::{Bvh, Caster};
 use crate::scene::OwnedScene;
 use crate::texture::SurfaceTexture;
@@ -39,12 +39,6 @@ const MOST_ROWS: u32 = 256;
 
 /// Rows and columns around the foot of a wall in which its sample points are joined to others.
 const AROUND: i64 = 2;
-
-/// Walks from what is walled off on a surface, one of which must come to light.
-const WALKS: u64 = 32;
-
-/// Walks that must.
-const WITNESSES: usize = 2;
 
 /// Square of the sine of the angle between two planes below which they have no line in common.
 const PARALLEL: f32 = 1e-4;
@@ -223,14 +217,11 @@ impl Cutter<'_> {
         let make = || Surroundings::of(self.scene, self.spacing, self.bvh).ok();
         let surroundings = self.surroundings.get_or_init(make).as_ref();
         let down = outline.normal() * height;
-        let mut caster = self.bvh.caster();
         surroundings.is_some_and(|surroundings| {
-            let mut walks = (0..WALKS).filter(|walk| {
-                let point = points[*walk as usize * points.len() / WALKS as usize];
-                let start = Place::new(outline, point - down);
-                surroundings.leads_to_light(&mut caster, start, seed * WALKS + walk)
-            });
-            walks.nth(WITNESSES - 1).is_some()
+            surroundings.is_reached(seed, |walk| {
+                let point = points[walk as usize * points.len() / WALKS as usize];
+                Place::new(outline, point - down)
+            })
         })
     }
 

@@ -26,7 +26,7 @@ use crate::bvh::{Bvh, Caster, Hit, lifted};
 use crate::noise;
 
 /// Walks that start at each part.
-const WALKS: u64 = 32;
+pub(super) const WALKS: u64 = 32;
 
 /// Rays of a walk.
 const LONGEST_WALK: u64 = 16;
@@ -252,16 +252,21 @@ impl<'a> Surroundings<'a> {
 
     fn walks_lead_to_light(&self, polygon: &Polygon, part: u32) -> bool {
         let points = gauss_points(polygon);
+        self.is_reached(u64::from(part), |walk| {
+            Place::new(polygon, points[walk as usize % points.len()].position)
+        })
+    }
+
+    /// True when enough of the walks that `start` somewhere, by their number of [`WALKS`], come to light.
+    pub(super) fn is_reached(&self, seed: u64, start: impl Fn(u64) -> Place) -> bool {
         let mut caster = self.bvh.caster();
-        let witnesses = (0..WALKS).filter(|walk| {
-            let start = Place::new(polygon, points[*walk as usize % points.len()].position);
-            self.leads_to_light(&mut caster, start, u64::from(part) * WALKS + walk)
-        });
+        let witnesses = (0..WALKS)
+            .filter(|walk| self.leads_to_light(&mut caster, start(*walk), seed * WALKS + walk));
         witnesses.take(WITNESSES).count() == WITNESSES
     }
 
     /// True when a walk from a place comes to light.
-    pub(super) fn leads_to_light(&self, caster: &mut Caster, start: Place, walk: u64) -> bool {
+    fn leads_to_light(&self, caster: &mut Caster, start: Place, walk: u64) -> bool {
         let mut place = start;
         for step in 0..LONGEST_WALK {
             let seed = (walk * LONGEST_WALK + step) * (2 + 4 * GLANCES);

@@ -91,6 +91,12 @@ impl ConvexPolygon {
         &self.vertices
     }
 
+    /// Largest difference of a coordinate from that of the first vertex.
+    #[must_use]
+    pub fn extent(&self) -> f64 {
+        extent(&self.vertices)
+    }
+
     /// Unit normal of the front.
     #[must_use]
     pub const fn normal(&self) -> DVec3 {

@@ -73,17 +73,20 @@ impl Shooter {
     pub fn of_patch(mesh: &Mesh, patch: u32, visibility: &impl Visibility) -> Option<Self> {
         let face = mesh.patches.get(patch as usize)?.face;
         let face = mesh.faces.get(face as usize)?;
-        Some(Self::of_face(face, visibility).part(mesh.patch_polygon(patch)?))
+        Some(Self::new(mesh.patch_polygon(patch)?).without_covers(face, visibility))
     }
 
     /// A whole face, without what lies on top of it.
     #[must_use]
     pub fn of_face(face: &Face, visibility: &impl Visibility) -> Self {
-        let mut shooter = Self::new(face.polygon);
+        Self::new(face.polygon).without_covers(face, visibility)
+    }
+
+    fn without_covers(mut self, face: &Face, visibility: &impl Visibility) -> Self {
         visibility.above(face.surface, face.polygon.normal(), &mut |cover| {
-            let _ = shooter.covers.push(*cover);
+            let _ = self.covers.push(*cover);
         });
-        shooter
+        self
     }
 
     /// A part of it.
