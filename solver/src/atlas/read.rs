@@ -1,5 +1,9 @@
 //! Reads an atlas in place: everything is checked once, then access is plain slicing.
 
+use core::iter;
+use core::ops::Range;
+use core::slice::ChunksExact;
+
 use glam::{Vec2, Vec3};
 
 use super::tiles::{Block, LARGEST_SIDE, Tiles};
@@ -241,10 +245,25 @@ impl<'a> Atlas<'a> {
         self.codes
     }
 
-    /// The codes of every element for its lights, where each is three bytes; `None` where one is not.
-    pub(crate) fn triples(&self) -> Option<impl Iterator<Item = &'a [[u8; 3]]> + use<'a>> {
-        let rows = self.codes.chunks_exact(self.stride.max(1));
-        (self.stride == 3 * self.counts.lights as usize).then(|| rows.map(|row| row.as_chunks().0))
+    /// All lights, in groups of equally many bytes of code.
+    pub(crate) fn groups(&self) -> impl Iterator<Item = Group<'a>> + use<'a> {
+        let atlas = *self;
+        let (mut light, mut start) = (0, 0);
+        iter::from_fn(move || {
+            let bytes_of = |light| code_at(atlas.lights, light).map(Code::bytes);
+            let (first, code_bytes) = (light, bytes_of(light)?);
+            while bytes_of(light) == Some(code_bytes) {
+                light += 1;
+            }
+            let from = start;
+            start += code_bytes * (light - first) as usize;
+            Some(Group {
+                code_bytes,
+                lights: first as usize..light as usize,
+                codes: atlas.codes.chunks_exact(atlas.stride.max(1)),
+                place: from..start,
+            })
+        })
     }
 
     /// Bytes of all codes, those in tiles included.
@@ -270,7 +289,12 @@ impl<'a> Atlas<'a> {
                 self.for_each_in_row(row, |l, codes| f(element, l, codes))
             });
         }
-        self.for_each_in_tiles(self.counts.lights, f);
+        self.for_each_in_tiles(f);
+    }
+
+    /// The same for the lights in tiles only.
+    pub(crate) fn for_each_in_tiles(&self, f: impl FnMut(u32, u32, [u16; 3])) {
+        self.for_each_of_first(self.counts.lights, f);
     }
 
     /// The same for one light, `f(element, codes)`.
@@ -282,7 +306,7 @@ impl<'a> Atlas<'a> {
         };
         if code.is_tiled() {
             let lights = light + 1;
-            return self.for_each_in_tiles(lights, |element, l, codes| {
+            return self.for_each_of_first(lights, |element, l, codes| {
                 if l == light {
                     f(element, codes);
                 }
@@ -316,7 +340,7 @@ impl<'a> Atlas<'a> {
     }
 
     /// The first so many lights, those in tiles.
-    fn for_each_in_tiles(&self, lights: u32, mut f: impl FnMut(u32, u32, [u16; 3])) {
+    fn for_each_of_first(&self, lights: u32, mut f: impl FnMut(u32, u32, [u16; 3])) {
         let Some(tiles) = self.tiles else {
             return;
         };
@@ -345,6 +369,32 @@ impl<'a> Atlas<'a> {
     #[must_use]
     pub const fn mesh(&self) -> Option<AtlasMesh<'a>> {
         self.mesh
+    }
+}
+
+/// Lights one after the other whose codes have equally many bytes: none in tiles.
+#[derive(Debug)]
+pub(crate) struct Group<'a> {
+    /// Bytes per element and light.
+    pub code_bytes: usize,
+    lights: Range<usize>,
+    /// The codes of every element for all lights.
+    codes: ChunksExact<'a, u8>,
+    /// Where those of these lights stand.
+    place: Range<usize>,
+}
+
+impl<'a> Group<'a> {
+    /// Tags of the lights.
+    pub(crate) fn lights(&self) -> Range<usize> {
+        self.lights.clone()
+    }
+
+    /// The codes of every element for these lights.
+    pub(crate) fn rows<const N: usize>(&self) -> impl Iterator<Item = &'a [[u8; N]]> + use<'a, N> {
+        let place = self.place.clone();
+        let own = move |row: &'a [u8]| row.get(place.clone()).unwrap_or_default();
+        self.codes.clone().map(move |row| own(row).as_chunks().0)
     }
 }
 

@@ -12,6 +12,7 @@
 //!   [`Curve`](crate::code::Curve) proves for the logarithmic code.
 
 mod by_light;
+mod bytes;
 mod fixed;
 mod float;
 mod frame;
@@ -20,6 +21,7 @@ mod wide;
 
 use core::fmt;
 
+use self::bytes::Values;
 use crate::atlas::Atlas;
 use crate::color::Rgb;
 
@@ -117,7 +119,7 @@ impl<'a, T: Copy + Default> CodeTable<'a, T> {
     }
 
     /// The same values where every code is a byte: `[light][channel][code]`; nothing where not.
-    fn of_bytes(&self) -> &[[[T; 256]; 3]] {
+    fn of_bytes(&self) -> &[Values<T>] {
         if self.levels == 256 {
             self.values.as_chunks().0.as_chunks().0
         } else {
@@ -158,6 +160,9 @@ fn check_elements(atlas: &Atlas, found: usize) -> Result<(), RelightError> {
         Err(RelightError::Elements { expected })
     }
 }
+
+#[cfg(test)]
+mod test_atlas;
 
 #[cfg(test)]
 mod tests;
