@@ -23,7 +23,11 @@ pub(super) trait Sum: Copy {
     fn of_luminance(values: &Values<Self::Value>, code: u8) -> [Self::Value; 4];
 
     /// Adds what a light contributes.
-    fn add(lanes: &mut [Self::Value; 4], weight: Self::Weight, values: [Self::Value; 4]);
+    fn add(
+        sum: [Self::Value; 4],
+        weight: Self::Weight,
+        values: [Self::Value; 4],
+    ) -> [Self::Value; 4];
 }
 
 /// Adds a group of lights to the sums of all elements; `lights` are their values and weights.
@@ -57,13 +61,15 @@ fn add_rows<'c, 'v, S: Sum<Value: 'v>, const N: usize>(
         for (lanes, sum) in together.iter_mut().zip(&*sums) {
             *lanes = sum.to_lanes();
         }
+        let [mut p, mut q, mut r, mut s] = together;
         let codes = a.iter().zip(b).zip(c).zip(d);
         for ((((a, b), c), d), (table, weight)) in codes.zip(lights.clone()) {
-            for (lanes, code) in together.iter_mut().zip([a, b, c, d]) {
-                S::add(lanes, weight, values(table, code));
-            }
+            p = S::add(p, weight, values(table, a));
+            q = S::add(q, weight, values(table, b));
+            r = S::add(r, weight, values(table, c));
+            s = S::add(s, weight, values(table, d));
         }
-        for (sum, lanes) in sums.iter_mut().zip(together) {
+        for (sum, lanes) in sums.iter_mut().zip([p, q, r, s]) {
             *sum = S::from_lanes(lanes);
         }
     }

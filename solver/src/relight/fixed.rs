@@ -281,8 +281,9 @@ impl Sum for [u32; 3] {
         of_colour(terms, [code; 3])
     }
 
-    fn add(lanes: &mut [u32; 4], (): (), terms: [u32; 4]) {
-        add(lanes, terms);
+    fn add(mut sum: [u32; 4], (): (), terms: [u32; 4]) -> [u32; 4] {
+        add(&mut sum, terms);
+        sum
     }
 }
 

@@ -84,10 +84,11 @@ impl Sum for Rgb {
         [value, value, value, 0.0]
     }
 
-    fn add(lanes: &mut [f32; 4], weight: Self, values: [f32; 4]) {
+    fn add(mut sum: [f32; 4], weight: Self, values: [f32; 4]) -> [f32; 4] {
         let weights = weight.to_lanes();
-        for ((lane, weight), value) in lanes.iter_mut().zip(weights).zip(values) {
-            *lane += weight * value;
+        for ((sum, weight), value) in sum.iter_mut().zip(weights).zip(values) {
+            *sum += weight * value;
         }
+        sum
     }
 }
