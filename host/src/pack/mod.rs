@@ -3,6 +3,7 @@
 mod choose;
 mod curves;
 mod measure;
+mod order;
 mod tiles;
 mod unpack;
 
