@@ -258,7 +258,7 @@ impl Terms for FixedTable<'_> {
         if tables.is_empty() {
             atlas.for_each(add);
         } else {
-            atlas.for_each_in_tiles(add);
+            atlas.for_each_in_tiles(None, add);
         }
     }
 }

@@ -62,7 +62,7 @@ pub fn relight(
     if tables.is_empty() {
         atlas.for_each(add);
     } else {
-        atlas.for_each_in_tiles(add);
+        atlas.for_each_in_tiles(None, add);
     }
     Ok(())
 }
