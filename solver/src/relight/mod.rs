@@ -3,7 +3,7 @@
 //! `E_j = sum_m w_m x_m(c_jm)`, channel by channel, with the decoded value `x_m` of a code
 //! ([`Curve`](crate::code::Curve)) and the weight `w_m`, the mix. Three kernels over the same codes:
 //!
-//! * [`relight`] in `f32`, for a host;
+//! * [`relight`] in `f32`, for a host, in vectors where codes are bytes;
 //! * [`relight_fixed`] in integers, for any device: every contribution is rounded to a whole number of a common unit
 //!   and `u32` sums are exact, so that a change ([`change_fixed`]) gives the bits of a full
 //!   relight, and a change and its undoing restore the same bits. Terms come from a table of all products
