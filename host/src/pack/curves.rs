@@ -192,10 +192,11 @@ fn parts(samples: &[Sample], white: Scale, tolerance: f32) -> Option<Curve> {
     let unit = |value: f32| 4096.0 * continued_code(value / white.value());
     let intervals = samples.iter().map(|s| s.interval(tolerance).map(unit));
     let mut intervals: Vec<[f32; 2]> = intervals.collect();
-    intervals.sort_unstable_by(|[a, _], [b, _]| a.total_cmp(b));
     // Where all lights are dark they are all off the same way: the first level takes a part of what is bearable.
-    let darkest = samples.iter().map(|s| s.interval(DARKEST * tolerance)[1]);
-    let first = (unit(darkest.fold(f32::INFINITY, f32::min)) / 256.0).floor();
+    let ends = samples.iter().zip(&intervals).map(|(s, [_, end])| (s, end));
+    let (darkest, _) = ends.min_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    let first = (unit(darkest.interval(DARKEST * tolerance)[1]) / 256.0).floor();
+    intervals.sort_unstable_by(|[a, _], [b, _]| a.total_cmp(b));
     if first > f32::from(LARGEST_PART_FIRST) {
         return None;
     }
