@@ -183,6 +183,20 @@ fn a_real_scene_is_packed_within_a_code() {
     assert!(bytes.len() <= log.len(), "{} {}", bytes.len(), log.len());
 }
 
+/// Their darkest places are dark in all lights, and all lights are off the same way there.
+#[test]
+fn display8_is_two_codes_off_in_real_scenes() {
+    for name in ["bevy_cornell", "gazebo"] {
+        let Some(scene) = bake_scene(name, None) else {
+            return;
+        };
+        let (_, error) = packed(&scene, Code::Display8);
+        println!("{name}: {error:?}");
+        assert!(error.achromatic.packed <= 2.0, "{name}: {error:?}");
+        assert!(error.all.packed <= 3.0, "{name}: {error:?}");
+    }
+}
+
 /// A closed box that is seen from inside, 4 x 3 x 3, with a lamp under its ceiling.
 fn boxed(at: f32, number: usize, first_vertex: usize) -> String {
     let corners = [

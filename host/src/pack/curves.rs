@@ -26,6 +26,9 @@ const WHITES: u8 = 18;
 const LEAST_TOLERANCE: f32 = 1e-3;
 const MOST_TOLERANCE: f32 = 64.0;
 
+/// The part of a tolerance that the first level takes.
+const DARKEST: f32 = 0.25;
+
 /// Ratio of two tolerances that are not told apart.
 const TOLERANCE: f32 = 1.01;
 
@@ -189,9 +192,11 @@ fn parts(samples: &[Sample], white: Scale, tolerance: f32) -> Option<Curve> {
     let unit = |value: f32| 4096.0 * continued_code(value / white.value());
     let intervals = samples.iter().map(|s| s.interval(tolerance).map(unit));
     let mut intervals: Vec<[f32; 2]> = intervals.collect();
+    // Where all lights are dark they are all off the same way: the first level takes a part of what is bearable.
+    let ends = samples.iter().zip(&intervals).map(|(s, [_, end])| (s, end));
+    let (darkest, _) = ends.min_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    let first = (unit(darkest.interval(DARKEST * tolerance)[1]) / 256.0).floor();
     intervals.sort_unstable_by(|[a, _], [b, _]| a.total_cmp(b));
-    let start = intervals.iter().map(|[_, to]| *to);
-    let first = (start.fold(f32::INFINITY, f32::min).max(0.0) / 256.0).floor();
     if first > f32::from(LARGEST_PART_FIRST) {
         return None;
     }

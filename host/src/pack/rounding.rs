@@ -39,8 +39,7 @@ pub(super) fn rounded<'a>(source: &'a Source, entries: &[LightEntry]) -> Cow<'a,
             Light {
                 tag,
                 weight: nominal.to_array(),
-                curves: entry.curves,
-                last: entry.last,
+                levels: entry.curves.map(levels),
                 states: stage.states(&own, entry.emission),
             }
         })
@@ -64,9 +63,16 @@ pub(super) fn rounded<'a>(source: &'a Source, entries: &[LightEntry]) -> Cow<'a,
 struct Light {
     tag: usize,
     weight: [f32; 3],
-    curves: [Curve; 3],
-    last: [u16; 3],
+    /// In ascending order.
+    levels: [Vec<f32>; 3],
     states: [States; 3],
+}
+
+/// The values of all codes.
+fn levels(curve: Curve) -> Vec<f32> {
+    (0..=u8::MAX)
+        .map(|code| curve.decode(code.into()))
+        .collect()
 }
 
 /// A channel of an element.
@@ -82,23 +88,34 @@ struct Place {
 struct Term<'a> {
     light: &'a Light,
     value: f32,
+    code: usize,
     level: f32,
+}
+
+impl<'a> Term<'a> {
+    /// With the nearest level.
+    fn new(light: &'a Light, channel: usize, value: f32) -> Self {
+        let levels = &light.levels[channel];
+        let above = levels.partition_point(|level| *level < value);
+        let near = [above.saturating_sub(1), above.min(levels.len() - 1)];
+        let [low, high] = near.map(|code| (value - levels[code]).abs());
+        let code = near[usize::from(high < low)];
+        Self {
+            light,
+            value,
+            code,
+            level: levels[code],
+        }
+    }
 }
 
 impl Place {
     /// Puts levels in the place of values until their sum is off by no more than is wanted.
     fn settle(&self, values: &mut [Rgb], lights: &[Light]) {
         let channel = self.channel;
-        let terms = lights.iter().map(|light| {
-            let (curve, last) = (light.curves[channel], light.last[channel]);
-            let value = values[light.tag].to_array()[channel];
-            let level = curve.decode(curve.encode(value, last));
-            Term {
-                light,
-                value,
-                level,
-            }
-        });
+        let terms = lights
+            .iter()
+            .map(|light| Term::new(light, channel, values[light.tag].to_array()[channel]));
         let mut terms: Vec<Term> = terms.collect();
         let weighted = |of: fn(&Term) -> f32| -> f32 {
             let terms = terms.iter();
@@ -114,20 +131,19 @@ impl Place {
                 return;
             }
             let moves = terms.iter().enumerate().filter_map(|(index, term)| {
-                let level = self.other_level(term)?;
-                let moved = found + term.light.weight[channel] * (level - term.level);
-                Some((self.off(exact, moved), index, level, moved))
+                let other = self.other_side(term)?;
+                let moved = found + term.light.weight[channel] * (other.level - term.level);
+                Some((self.off(exact, moved), index, other, moved))
             });
             let best = moves.min_by(|(a, ..), (b, ..)| a.total_cmp(b));
-            let Some((_, index, level, moved)) = best.filter(|(left, ..)| *left < off) else {
+            let Some((_, index, other, moved)) = best.filter(|(left, ..)| *left < off) else {
                 return;
             };
             found = moved;
-            terms[index].level = level;
-            let tag = terms[index].light.tag;
-            let mut rgb = values[tag].to_array();
-            rgb[channel] = level;
-            values[tag] = Rgb::from_array(rgb);
+            terms[index] = other;
+            let mut rgb = values[other.light.tag].to_array();
+            rgb[channel] = other.level;
+            values[other.light.tag] = Rgb::from_array(rgb);
         }
     }
 
@@ -138,23 +154,22 @@ impl Place {
         codes(packed).max(codes(shown / self.reflectance) / MORE_SHOWN)
     }
 
-    /// The level on the other side of a value, if that bears it.
-    fn other_level(&self, term: &Term) -> Option<f32> {
-        let Term {
-            light,
-            value,
-            level,
-        } = *term;
-        let (curve, last) = (light.curves[self.channel], light.last[self.channel]);
-        let code = curve.encode(level, last);
-        let other = if level < value {
-            Some(code + 1).filter(|code| *code <= last)
+    /// With the level on the other side of the value, if that bears it.
+    fn other_side<'a>(&self, term: &Term<'a>) -> Option<Term<'a>> {
+        let code = if term.level < term.value {
+            term.code + 1
         } else {
-            code.checked_sub(1)
+            term.code.checked_sub(1)?
         };
-        let other = curve.decode(other?);
-        let sample = Sample::new(value, self.reflectance, light.states[self.channel]);
+        let level = *term.light.levels[self.channel].get(code)?;
+        let states = term.light.states[self.channel];
+        let sample = Sample::new(term.value, self.reflectance, states);
         let [low, high] = sample.interval(TOLERANCE);
-        (low..=high).contains(&other).then_some(other)
+        let other = Term {
+            code,
+            level,
+            ..*term
+        };
+        (low..=high).contains(&level).then_some(other)
     }
 }
