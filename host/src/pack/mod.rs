@@ -153,7 +153,7 @@ pub fn pack_lights(
     Ok((packed.write(mesh, Some(&error))?, error))
 }
 
-/// An atlas of irradiance without a mesh, whose errors nobody measured.
+/// An atlas of irradiance, or of a picture, without a mesh, whose errors nobody measured.
 ///
 /// # Errors
 /// [`PackError`] when counts or values leave the format's range.
@@ -192,7 +192,9 @@ struct Source<'a> {
 }
 
 impl<'a> Source<'a> {
+    /// A picture is radiance, whatever is asked for.
     fn new(solution: &'a Solution, quantity: Quantity) -> Self {
+        let quantity = solution.image.map_or(quantity, |_| Quantity::Radiance);
         let lights = solution.lights.len().max(1);
         let elements = solution.mesh.elements.iter();
         let values = match quantity {
