@@ -111,13 +111,15 @@ impl Rgb565Table {
 impl Encode for Rgb565Table {
     type Pixel = u16;
 
+    const BITS: [u32; 3] = [10, 11, 10];
+
     fn white(&self) -> u16 {
         self.white
     }
 
     #[inline(always)]
     fn encode(&self, [r, g, b]: [u32; 3]) -> u16 {
-        let (r, b) = (step_of(&self.five, r / 2), step_of(&self.five, b / 2));
+        let (r, b) = (step_of(&self.five, r), step_of(&self.five, b));
         b | step_of(&self.six, g) << 5 | r << 11
     }
 }
@@ -143,6 +145,8 @@ impl Rgb888Table {
 impl Encode for Rgb888Table {
     type Pixel = [u8; 3];
 
+    const BITS: [u32; 3] = [11; 3];
+
     fn white(&self) -> u16 {
         self.white
     }
@@ -155,7 +159,7 @@ impl Encode for Rgb888Table {
 
 #[inline(always)]
 fn step_of<const N: usize>(table: &[u8; N], step: u32) -> u16 {
-    // Not reached by the kernels, whose steps have 11 bits.
+    // Not reached by the kernels, whose steps have no more bits than they should.
     u16::from(table.get(step as usize).copied().unwrap_or(u8::MAX))
 }
 

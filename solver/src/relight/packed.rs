@@ -15,10 +15,10 @@
 use core::array;
 use core::hint::black_box;
 
-use super::frame::{Encode, Finish, FrameLight, FrameMix, Terms, Weight};
+use super::frame::{Encode, Finish, FrameLight, FrameMix, Weight, values};
 use super::{CodeTable, RelightError, check_elements};
 use crate::atlas::{Atlas, AtlasError};
-use crate::code::{AllCodes, Code, ExponentialCodes, Known};
+use crate::code::{AllCodes, Code, DECODED, ExponentialCodes, Known};
 use crate::color::Rgb;
 
 /// Bits of red, green and blue in a packed word, red at the top.
@@ -72,16 +72,25 @@ pub trait Form {
     /// The codes of all elements, whose lights stand next to each other; `None` for lights in another form.
     fn codes<'a>(atlas: &Atlas<'a>) -> Option<&'a [Self::Codes]>;
 
-    /// Puts what a weight makes of every code into a table; of a change, minus what it made before.
-    fn fill(table: &mut Self::Table, before: Option<&Terms>, after: &Terms);
+    /// Puts what weights make of every code of a light into a table, minus what other weights made of it before.
+    ///
+    /// # Errors
+    /// [`RelightError::Lights`] without such a light.
+    fn fill(
+        table: &mut Self::Table,
+        atlas: &Atlas,
+        light: u32,
+        before: Option<[Weight; 3]>,
+        after: [Weight; 3],
+    ) -> Result<(), RelightError>;
 
     /// A sum, and what a table says of a light's codes.
     #[must_use]
     fn add(sum: Self::Sum, table: &Self::Table, codes: &Self::Codes) -> Self::Sum;
 
-    /// What is shown of a sum.
+    /// What is shown of a sum, in steps of so many bits.
     #[must_use]
-    fn steps(sum: Self::Sum, factors: [u16; 3]) -> [u32; 3];
+    fn steps(sum: Self::Sum, factors: [u16; 3], bits: [u32; 3]) -> [u32; 3];
 }
 
 /// All lights in [`Code::Lum8`].
@@ -114,13 +123,19 @@ impl Form for Lum {
         fits.then_some(atlas.codes())
     }
 
-    fn fill(table: &mut [u32; 256], before: Option<&Terms>, after: &Terms) {
-        if let Some(before) = before {
-            fill_packed(table, before, 0);
-            fill_packed(table, after, u32::MAX);
-        } else {
-            fill_packed(table, after, 0);
+    fn fill(
+        table: &mut [u32; 256],
+        _: &Atlas,
+        _: u32,
+        before: Option<[Weight; 3]>,
+        after: [Weight; 3],
+    ) -> Result<(), RelightError> {
+        let mut kept = 0;
+        for weights in before.iter().chain([&after]) {
+            fill_packed(table, weights, kept);
+            kept = u32::MAX;
         }
+        Ok(())
     }
 
     #[inline(always)]
@@ -129,30 +144,37 @@ impl Form for Lum {
     }
 
     #[inline(always)]
-    fn steps(sum: u32, factors: [u16; 3]) -> [u32; 3] {
-        let [r, g, b] = factors.map(u32::from);
-        // Small cores take 16 bits out in two instructions, other numbers of bits in four: green has a piece of blue behind it.
-        let blue = if IS_SMALL {
-            ((sum << 6 & 0xffff) * b) >> 21
-        } else {
-            ((sum & 0x3ff) * b) >> 15
-        };
-        // Steps of 11 bits.
+    fn steps(sum: u32, [r, g, b]: [u16; 3], bits: [u32; 3]) -> [u32; 3] {
+        let [bits_r, bits_g, bits_b] = bits;
         [
-            ((sum >> 22) * r) >> 15,
-            ((sum >> 6 & 0xffff) * g) >> 21,
-            blue,
+            scaled(sum >> 22, r, 26 - bits_r),
+            // With a piece of blue behind it, which fewer cores than not would have to cut off.
+            scaled(sum >> 6 & 0xffff, g, 32 - bits_g),
+            scaled(sum & 0x3ff, b, 26 - bits_b),
         ]
     }
 }
 
-/// Puts what a weight makes of every code into a table, minus what is `kept` of it.
+/// `2^-shift value factor`, cut, for products below 2^32.
+#[inline(always)]
+fn scaled(value: u32, factor: u16, shift: u32) -> u32 {
+    if IS_SMALL || shift < 16 {
+        (value * u32::from(factor)) >> shift
+    } else {
+        // The upper half of a product of 64 bits, which a single instruction gives.
+        let factor = u32::from(factor) << (32 - shift);
+        ((u64::from(value) * u64::from(factor)) >> 32) as u32
+    }
+}
+
+/// Puts what weights make of every code into a table, minus what is `kept` of it.
 #[inline(never)]
-fn fill_packed(table: &mut [u32; 256], [(r, values), (g, _), (b, _)]: &Terms, kept: u32) {
-    values.with_codes::<ExponentialCodes, _>(table.iter_mut(), |entry, value| {
+fn fill_packed(table: &mut [u32; 256], [r, g, b]: &[Weight; 3], kept: u32) {
+    for (entry, value) in table.iter_mut().zip(&DECODED) {
+        let value = u32::from(*value);
         let packed = r.of(value) << 22 | g.of(value) << 10 | b.of(value);
         *entry = packed.wrapping_sub(*entry & kept);
-    });
+    }
 }
 
 /// All lights in codes of three bytes.
@@ -186,13 +208,21 @@ impl Form for Colour {
     }
 
     #[inline(never)]
-    fn fill(tables: &mut [[u16; 256]; 3], before: Option<&Terms>, after: &Terms) {
-        let old = before.map_or([Weight::ZERO; 3], |terms| terms.map(|(weight, _)| weight));
-        for ((table, (weight, values)), old) in tables.iter_mut().zip(after).zip(old) {
+    fn fill(
+        tables: &mut [[u16; 256]; 3],
+        atlas: &Atlas,
+        light: u32,
+        before: Option<[Weight; 3]>,
+        after: [Weight; 3],
+    ) -> Result<(), RelightError> {
+        let values = values::<Self::Known>(atlas, light)?;
+        let weights = before.unwrap_or([Weight::ZERO; 3]).into_iter().zip(after);
+        for ((table, values), (before, after)) in tables.iter_mut().zip(&values).zip(weights) {
             values.with_codes::<Self::Known, _>(table.iter_mut(), |entry, value| {
-                *entry = weight.of(value).wrapping_sub(old.of(value)) as u16;
+                *entry = after.of(value).wrapping_sub(before.of(value)) as u16;
             });
         }
+        Ok(())
     }
 
     #[inline(always)]
@@ -207,10 +237,14 @@ impl Form for Colour {
     }
 
     #[inline(always)]
-    fn steps(sum: [u16; 3], factors: [u16; 3]) -> [u32; 3] {
+    fn steps(sum: [u16; 3], factors: [u16; 3], bits: [u32; 3]) -> [u32; 3] {
         let ([r, g, b], [factor_r, factor_g, factor_b]) = (sum, factors);
-        let step = |sum: u16, factor: u16| (u32::from(sum) * u32::from(factor)) >> 21;
-        [step(r, factor_r), step(g, factor_g), step(b, factor_b)]
+        let [bits_r, bits_g, bits_b] = bits;
+        [
+            scaled(r.into(), factor_r, 32 - bits_r),
+            scaled(g.into(), factor_g, 32 - bits_g),
+            scaled(b.into(), factor_b, 32 - bits_b),
+        ]
     }
 }
 
@@ -232,9 +266,8 @@ pub fn fill_table<F: Form>(
     light: u32,
     table: &mut F::Table,
 ) -> Result<(), RelightError> {
-    let terms = mix.terms::<F::Known>(atlas, light, F::BITS)?;
-    F::fill(table, None, &terms);
-    Ok(())
+    let weights = mix.weights(light, F::BITS)?;
+    F::fill(table, atlas, light, None, weights)
 }
 
 /// Sets the levels of one light, and multiplies out by how much it changes.
@@ -248,10 +281,10 @@ pub(super) fn fill_change<F: Form>(
     (light, levels): (u32, [u16; 3]),
     table: &mut F::Table,
 ) -> Result<(), RelightError> {
-    let before = mix.terms::<F::Known>(atlas, light, F::BITS)?;
+    let before = mix.weights(light, F::BITS)?;
+    let after = mix.weights_at(light, levels, F::BITS)?;
+    F::fill(table, atlas, light, Some(before), after)?;
     mix.set(light, levels);
-    let after = mix.terms::<F::Known>(atlas, light, F::BITS)?;
-    F::fill(table, Some(&before), &after);
     Ok(())
 }
 
@@ -266,10 +299,10 @@ pub fn full<F: Form, const K: usize, T: Encode>(
     pixels: &mut [T::Pixel],
 ) -> Result<(), RelightError> {
     check_elements(atlas, pixels.len())?;
-    let mut rows = rows::<F, K>(atlas)?;
-    finish.by_run(pixels, |pixels, factors| {
-        let own = rows.split_off(..pixels.len()).unwrap_or_default();
-        full_run::<F, K, T>(own, tables, factors, finish.tone, pixels);
+    let mut pixels = pixels;
+    finish.by_run(rows::<F, K>(atlas)?, |rows, factors| {
+        let own = pixels.split_off_mut(..rows.len()).unwrap_or_default();
+        full_run::<F, K, T>(rows, tables, factors, finish.tone, own);
     })
 }
 
@@ -334,7 +367,7 @@ fn show_group<F: Form, const N: usize, T: Encode>(
     pixels: &mut [T::Pixel; N],
 ) {
     for (sum, pixel) in sums.iter().zip(pixels) {
-        *pixel = tone.encode(F::steps(*sum, factors));
+        *pixel = tone.encode(F::steps(*sum, factors, T::BITS));
         as_it_is();
     }
 }
@@ -402,30 +435,52 @@ impl<'a, F: Form> Sums<'a, F> {
         finish: &Finish<T>,
         pixels: &mut [T::Pixel],
     ) -> Result<(), RelightError> {
-        let mut sums = &*self.sums;
-        finish.by_run(pixels, |pixels, factors| {
-            let own = sums.split_off(..pixels.len()).unwrap_or_default();
-            show::<F, T>(own, factors, finish.tone, pixels);
+        check_pixels(self.sums.len(), pixels.len())?;
+        let mut pixels = pixels;
+        finish.by_run(self.sums, |sums, factors| {
+            let own = pixels.split_off_mut(..sums.len()).unwrap_or_default();
+            show::<F, T>(sums, factors, finish.tone, own);
         })
     }
 
-    /// Sets the levels of one light, corrects the sums for it, and shows them: [`Self::set`] and [`Self::apply`].
+    /// The pixels of all elements in their order, strip after strip in a buffer of any length: `send` takes each to the display.
+    ///
+    /// A strip is as long as the buffer, or ends with a run.
     ///
     /// # Errors
-    /// Slices and runs that do not fit the atlas, or no such light. Nothing has changed then.
-    pub fn change<const K: usize, T: Encode>(
+    /// Runs of another length; a buffer of none.
+    pub fn show_strips<T: Encode>(
+        &self,
+        finish: &Finish<T>,
+        strip: &mut [T::Pixel],
+        mut send: impl FnMut(&[T::Pixel]),
+    ) -> Result<(), RelightError> {
+        if strip.is_empty() {
+            return Err(RelightError::Elements { expected: 1 });
+        }
+        finish.by_run(self.sums, |sums, factors| {
+            for sums in sums.chunks(strip.len()) {
+                let strip = strip.get_mut(..sums.len()).unwrap_or_default();
+                show::<F, T>(sums, factors, finish.tone, strip);
+                send(strip);
+            }
+        })
+    }
+
+    /// Sets the levels of one light, and corrects the sums for it: [`Self::set`] and [`Self::apply`].
+    ///
+    /// # Errors
+    /// Another atlas, or no such light. Nothing has changed then.
+    pub fn change<const K: usize>(
         &mut self,
         atlas: &Atlas,
         mix: &mut FrameMix,
         (light, levels): (u32, [u16; 3]),
-        finish: &Finish<T>,
-        pixels: &mut [T::Pixel],
     ) -> Result<(), RelightError> {
-        check_elements(atlas, pixels.len())?;
-        finish.check(pixels.len())?;
+        check_elements(atlas, self.sums.len())?;
         rows::<F, K>(atlas)?;
         self.set(atlas, mix, (light, levels))?;
-        self.apply::<K, T>(atlas, light, finish, pixels)
+        self.apply::<K>(atlas, light)
     }
 
     /// Sets the levels of one light, and multiplies out by how much it changes; [`Self::apply`] must follow.
@@ -441,26 +496,14 @@ impl<'a, F: Form> Sums<'a, F> {
         fill_change::<F>(atlas, mix, (light, levels), self.table)
     }
 
-    /// Corrects the sums for the light that was set, and shows them.
+    /// Corrects the sums for the light that was set.
     ///
     /// # Errors
-    /// Slices and runs that do not fit the atlas. Nothing has changed then.
-    pub fn apply<const K: usize, T: Encode>(
-        &mut self,
-        atlas: &Atlas,
-        light: u32,
-        finish: &Finish<T>,
-        pixels: &mut [T::Pixel],
-    ) -> Result<(), RelightError> {
-        check_elements(atlas, pixels.len())?;
-        let mut rows = rows::<F, K>(atlas)?;
-        let (light, table, mut sums) = (light as usize, &*self.table, &mut *self.sums);
-        finish.by_run(pixels, |pixels, factors| {
-            let own = rows.split_off(..pixels.len()).unwrap_or_default();
-            let sums = sums.split_off_mut(..pixels.len()).unwrap_or_default();
-            add_light::<F, K>(own, light, table, sums);
-            show::<F, T>(sums, factors, finish.tone, pixels);
-        })
+    /// Another atlas. Nothing has changed then.
+    pub fn apply<const K: usize>(&mut self, atlas: &Atlas, light: u32) -> Result<(), RelightError> {
+        check_elements(atlas, self.sums.len())?;
+        add_light::<F, K>(rows::<F, K>(atlas)?, light as usize, self.table, self.sums);
+        Ok(())
     }
 }
 
@@ -491,9 +534,12 @@ impl<'a> AnyTable<'a> {
         mix: &FrameMix,
         light: u32,
     ) -> Result<(), RelightError> {
-        let terms = mix.terms::<AllCodes>(atlas, light, [SINGLE; 3])?;
+        let (weights, values) = (
+            mix.weights(light, [SINGLE; 3])?,
+            values::<AllCodes>(atlas, light)?,
+        );
         self.0.fill(light, |channel, code| {
-            let term = terms.get(channel);
+            let term = weights.get(channel).zip(values.get(channel));
             // Below the full scale.
             term.map_or(0, |(weight, values)| {
                 weight.of(values.of::<AllCodes>(code)) as u16
@@ -527,13 +573,22 @@ pub fn full_any<T: Encode>(
             ];
         }
     });
-    let mut sums = &*sums;
-    finish.by_run(pixels, |pixels, factors| {
-        let own = sums.split_off(..pixels.len()).unwrap_or_default();
-        for (sum, pixel) in own.iter().zip(pixels) {
-            *pixel = finish.tone.encode(Colour::steps(*sum, factors));
+    let mut pixels = pixels;
+    finish.by_run(sums, |sums, factors| {
+        let own = pixels.split_off_mut(..sums.len()).unwrap_or_default();
+        for (sum, pixel) in sums.iter().zip(own) {
+            *pixel = finish.tone.encode(Colour::steps(*sum, factors, T::BITS));
         }
     })
+}
+
+/// Whether there is a pixel for every element.
+pub(super) fn check_pixels(elements: usize, pixels: usize) -> Result<(), RelightError> {
+    let expected = elements as u32;
+    match elements == pixels {
+        true => Ok(()),
+        false => Err(RelightError::Elements { expected }),
+    }
 }
 
 /// Every element's codes of all its `K` lights.

@@ -169,13 +169,17 @@ pub fn run_change<F: Form, const K: usize>(
     must(kept.show(finish, pixels));
     let unchanged = hash(pixels);
     let cold = count(|| {
-        must(kept.change::<K, _>(atlas, mix, (CHANGED, *after), finish, pixels));
+        must(kept.change::<K>(atlas, mix, (CHANGED, *after)));
+        must(kept.show(finish, pixels));
     });
     let changed = hash(pixels);
     one_index(pixels, changed);
     must(kept.set(atlas, mix, (CHANGED, *before)));
     // What is left when the table is there already.
-    let warm = count(|| must(kept.apply::<K, _>(atlas, CHANGED, finish, pixels)));
+    let warm = count(|| {
+        must(kept.apply::<K>(atlas, CHANGED));
+        must(kept.show(finish, pixels));
+    });
     same(unchanged, hash(pixels));
     report(cold, warm, changed)
 }
