@@ -119,8 +119,9 @@ impl Encode for Rgb565Table {
 
     #[inline(always)]
     fn encode(&self, [r, g, b]: [u32; 3]) -> u16 {
-        let (r, b) = (step_of(&self.five, r), step_of(&self.five, b));
-        b | step_of(&self.six, g) << 5 | r << 11
+        let g = step_of(&self.six, g) << 5;
+        let r = step_of(&self.five, r) << 11;
+        (g + r) + step_of(&self.five, b)
     }
 }
 
