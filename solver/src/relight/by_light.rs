@@ -6,7 +6,7 @@
 use core::num::NonZeroUsize;
 
 use super::frame::{Encode, Finish, FrameMix};
-use super::packed::{Factors, Form, check_pixels, fill_change, fill_table};
+use super::packed::{Factors, Form, HAS_WIDE, check_pixels, fill_change, fill_table};
 use super::{RelightError, check_elements};
 use crate::atlas::Atlas;
 
@@ -82,7 +82,7 @@ pub fn show_sums<F: Form, T: Encode>(
         let factors = Factors::new::<F>(factors);
         let own = pixels.split_off_mut(..sums.len()).unwrap_or_default();
         for (sum, pixel) in sums.iter().zip(own) {
-            *pixel = finish.tone.encode(factors.steps::<F, T>(*sum));
+            *pixel = finish.tone.encode(factors.steps::<F, T, HAS_WIDE>(*sum));
         }
     })
 }

@@ -32,6 +32,7 @@ const SINGLE: u32 = 16;
 /// Whether this is a core of eight registers, ARMv6-M: of the ones that are supported, it alone has no compare-and-swap. Its
 /// loops are cut in another way; what they compute is the same.
 const IS_SMALL: bool = !cfg!(target_has_atomic = "32");
+pub(super) const HAS_WIDE: bool = !IS_SMALL;
 
 /// Elements that look for a table together.
 const GROUP: usize = if IS_SMALL { 1 } else { 2 };
@@ -166,6 +167,7 @@ fn fill_packed(table: &mut [u32; 256], [r, g, b]: &[Weight; 3], kept: u32) {
         let value = u32::from(*value);
         let packed = r.of(value) << 22 | g.of(value) << 10 | b.of(value);
         *entry = packed.wrapping_sub(*entry & kept);
+        as_it_is();
     }
 }
 
@@ -253,29 +255,27 @@ impl Factors {
     /// Keeps the compiler of a small core from filling its registers with factors, which its stack gives as fast.
     #[inline(always)]
     fn stay_in_memory(&self) {
-        if IS_SMALL {
-            black_box(self);
-        }
+        black_box(self);
     }
 
     /// The steps of a sum.
     #[inline(always)]
-    pub(super) fn steps<F: Form, T: Encode>(&self, sum: F::Sum) -> [u32; 3] {
+    pub(super) fn steps<F: Form, T: Encode, const WIDE: bool>(&self, sum: F::Sum) -> [u32; 3] {
         let Self([factor_r, factor_g, factor_b]) = self;
         let ([r, g, b], [fields_r, fields_g, fields_b]) = (F::fields(sum), F::SHOWN);
         let [bits_r, bits_g, bits_b] = T::BITS;
         [
-            step(r, factor_r.get(), fields_r, bits_r),
-            step(g, factor_g.get(), fields_g, bits_g),
-            step(b, factor_b.get(), fields_b, bits_b),
+            step::<WIDE>(r, factor_r.get(), fields_r, bits_r),
+            step::<WIDE>(g, factor_g.get(), fields_g, bits_g),
+            step::<WIDE>(b, factor_b.get(), fields_b, bits_b),
         ]
     }
 }
 
 /// The upper `bits` of the product of a field of so many bits and its factor.
 #[inline(always)]
-fn step(field: u32, factor: u32, field_bits: u32, bits: u32) -> u32 {
-    if IS_SMALL || bits > field_bits {
+fn step<const WIDE: bool>(field: u32, factor: u32, field_bits: u32, bits: u32) -> u32 {
+    if !WIDE || bits > field_bits {
         (field * factor) >> (32 - bits)
     } else {
         // The upper half of 64 bits takes one instruction.
@@ -351,6 +351,7 @@ fn full_run<F: Form, const K: usize, T: Encode>(
     pixels: &mut [T::Pixel],
 ) {
     let factors = &Factors::new::<F>(factors);
+    factors.stay_in_memory();
     let (groups, rest) = rows.as_chunks();
     let (shown, rest_shown) = pixels.as_chunks_mut();
     for (rows, pixels) in groups.iter().zip(shown) {
@@ -379,33 +380,35 @@ fn full_group<F: Form, const K: usize, const N: usize, T: Encode>(
             }
         }
     }
-    show_group::<F, N, T>(&sums, factors, tone, pixels);
+    show_group::<F, N, false, T>(&sums, factors, tone, pixels);
 }
 
 /// The pixels of some sums.
 #[inline(never)]
 fn show<F: Form, T: Encode>(sums: &[F::Sum], factors: [u16; 3], tone: &T, pixels: &mut [T::Pixel]) {
     let factors = &Factors::new::<F>(factors);
-    factors.stay_in_memory();
+    if IS_SMALL {
+        factors.stay_in_memory();
+    }
     let (groups, rest) = sums.as_chunks::<SHOWN>();
     let (shown, rest_shown) = pixels.as_chunks_mut();
     side_by_side(groups, shown, |sums, pixels| {
-        show_group::<F, SHOWN, T>(sums, factors, tone, pixels);
+        show_group::<F, SHOWN, HAS_WIDE, T>(sums, factors, tone, pixels);
     });
     side_by_side(rest, rest_shown, |sum, pixel| {
-        show_group::<F, 1, T>(array::from_ref(sum), factors, tone, array::from_mut(pixel));
+        show_group::<F, 1, HAS_WIDE, T>(array::from_ref(sum), factors, tone, array::from_mut(pixel));
     });
 }
 
 #[inline(always)]
-fn show_group<F: Form, const N: usize, T: Encode>(
+fn show_group<F: Form, const N: usize, const WIDE: bool, T: Encode>(
     sums: &[F::Sum; N],
     factors: &Factors,
     tone: &T,
     pixels: &mut [T::Pixel; N],
 ) {
     for (sum, pixel) in sums.iter().zip(pixels) {
-        *pixel = tone.encode(factors.steps::<F, T>(*sum));
+        *pixel = tone.encode(factors.steps::<F, T, WIDE>(*sum));
         as_it_is();
     }
 }
@@ -651,7 +654,7 @@ pub fn full_any<T: Encode>(
         let factors = Factors::new::<Colour>(factors);
         let own = pixels.split_off_mut(..sums.len()).unwrap_or_default();
         for (sum, pixel) in sums.iter().zip(own) {
-            *pixel = finish.tone.encode(factors.steps::<Colour, T>(*sum));
+            *pixel = finish.tone.encode(factors.steps::<Colour, T, true>(*sum));
         }
     })
 }
