@@ -19,6 +19,7 @@ use crate::scene::Emission;
 /// A checked atlas that borrows its bytes.
 #[derive(Clone, Copy, Debug)]
 pub struct Atlas<'a> {
+    checksum: u32,
     quantity: Quantity,
     image_width: u16,
     counts: CountsOf,
@@ -61,6 +62,40 @@ impl<'a> Atlas<'a> {
     #[inline(never)]
     pub fn parse_exponential(bytes: &'a [u8]) -> Result<Self, AtlasError> {
         Ok(Self::parse_parts::<ExponentialCodes>(bytes)?.0)
+    }
+
+    /// The same for an atlas that was found legal when it had this checksum: only the checksum is looked at again.
+    ///
+    /// # Errors
+    /// [`AtlasError::Checksum`] for other bytes, and what is wrong with their header.
+    #[inline(never)]
+    pub fn parse_known(bytes: &'a [u8], known: u32) -> Result<Self, AtlasError> {
+        let header = Header::parse(bytes)?;
+        let found = checksum::<ExponentialCodes>(bytes);
+        if header.checksum != known || found != Some(known) {
+            return Err(AtlasError::Checksum);
+        }
+        let counts = header.counts;
+        let (_, behind) = bytes.split_at_checked(HEADER_BYTES).unwrap_or_default();
+        let length = (counts.lights as usize).saturating_mul(LIGHT_BYTES);
+        let (lights, behind) = behind.split_at_checked(length).unwrap_or_default();
+        let codes = behind.get(counts.names as usize..).unwrap_or_default();
+        let codes_of = |light| code_at(lights, light).map_or(0, Code::bytes);
+        let stride = (0..counts.lights).map(codes_of).sum::<usize>();
+        let length = (counts.elements as usize).saturating_mul(stride);
+        Ok(Self {
+            checksum: known,
+            quantity: header.quantity,
+            image_width: header.image_width,
+            counts,
+            worst_error: header.worst_error,
+            lights,
+            names: "",
+            stride,
+            codes: codes.get(..length).unwrap_or_default(),
+            tiles: None,
+            mesh: None,
+        })
     }
 
     /// The atlas without its mesh, and the mesh, not checked yet.
@@ -119,6 +154,7 @@ impl<'a> Atlas<'a> {
         let tiles =
             (!K::ONLY_EXPONENTIAL && is_tiled).then(|| Tiles::parse(tiles, counts.elements));
         let atlas = Self {
+            checksum: header.checksum,
             quantity: header.quantity,
             image_width: header.image_width,
             counts,
@@ -163,6 +199,12 @@ impl<'a> Atlas<'a> {
         } else {
             Err(AtlasError::Illegal("light name"))
         }
+    }
+
+    /// The CRC-32 of its bytes.
+    #[must_use]
+    pub const fn checksum(&self) -> u32 {
+        self.checksum
     }
 
     /// What the contributions measure.

@@ -64,6 +64,14 @@ impl Gain {
         exponent: 0,
     };
 
+    pub(super) const fn parts(self) -> (u16, i16) {
+        (self.mantissa, self.exponent)
+    }
+
+    pub(super) const fn from_parts((mantissa, exponent): (u16, i16)) -> Self {
+        Self { mantissa, exponent }
+    }
+
     fn new(value: Wide) -> Self {
         let Magnitude { mantissa, exponent } = value.magnitude();
         Self {
@@ -183,10 +191,19 @@ pub struct FrameLight {
 
 impl FrameLight {
     /// A light that gives nothing: room for [`FrameMix::new`].
-    pub const EMPTY: Self = Self {
-        gains: [Gain::ZERO; 3],
-        levels: [0; 3],
-    };
+    pub const EMPTY: Self = Self::new([Gain::ZERO; 3]);
+
+    /// A light that is off.
+    pub(super) const fn new(gains: [Gain; 3]) -> Self {
+        Self {
+            gains,
+            levels: [0; 3],
+        }
+    }
+
+    pub(super) const fn gains(&self) -> [Gain; 3] {
+        self.gains
+    }
 }
 
 /// A mix in levels.
@@ -240,10 +257,7 @@ impl<'a> FrameMix<'a> {
         if full.len() > 1000 {
             return Err(RelightError::Range);
         }
-        let mut mix = Self {
-            lights,
-            full_scale: [Wide::ZERO; 3],
-        };
+        let mut mix = Self::of_lights(lights);
         mix.for_units::<K>(atlas, full, |_, scale, unit, largest| {
             *scale = scale.plus(unit.times(largest));
         });
@@ -259,6 +273,14 @@ impl<'a> FrameMix<'a> {
         }
         mix.fill_gains::<K>(atlas, full);
         Ok(mix)
+    }
+
+    /// Without a full scale.
+    pub(super) const fn of_lights(lights: &'a mut [FrameLight]) -> Self {
+        Self {
+            lights,
+            full_scale: [Wide::ZERO; 3],
+        }
     }
 
     /// Gains at the present full scale; levels become 0.
@@ -366,7 +388,7 @@ impl<'a> FrameMix<'a> {
 
     /// The gains of [`Finish`]; `None` where its error is [`RelightError::Range`].
     #[inline(never)]
-    fn shown(&self, runs: &[Run], exposure: f32, white: u16) -> Option<[Shown; 3]> {
+    fn shown(&self, runs: &[Run], exposure: f32, white: u16) -> Option<[Gain; 3]> {
         let is_positive = (1..0x7f80_0000).contains(&exposure.to_bits());
         let white = Wide::new(white.into(), -(STEPS.ilog2() as i32));
         let shown = Wide::from_float(exposure).times(Wide::from_float(FRAC_1_PI));
@@ -376,7 +398,7 @@ impl<'a> FrameMix<'a> {
             let mut channels = gains.iter().zip(run.reflectance);
             channels.all(|(gain, reflectance)| gain.fits(reflectance))
         };
-        (is_positive && runs.iter().all(fits)).then(|| gains.map(Shown::new))
+        (is_positive && runs.iter().all(fits)).then_some(gains)
     }
 
     /// Sets the levels of a light: shares of its full weight, 2^-16 each; without such a light nothing happens.
@@ -499,7 +521,7 @@ pub struct Finish<'a, T> {
     runs: &'a [Run],
     /// Of all runs.
     elements: usize,
-    gains: [Shown; 3],
+    gains: [Gain; 3],
     pub(super) tone: &'a T,
 }
 
@@ -517,16 +539,28 @@ impl<'a, T: Encode> Finish<'a, T> {
         exposure: f32,
         tone: &'a T,
     ) -> Result<Self, RelightError> {
+        let gains = mix.shown(runs, exposure, tone.white());
+        Self::with_gains(atlas, runs, gains.ok_or(RelightError::Range)?, tone)
+    }
+
+    pub(super) fn with_gains(
+        atlas: &Atlas,
+        runs: &'a [Run],
+        gains: [Gain; 3],
+        tone: &'a T,
+    ) -> Result<Self, RelightError> {
         let elements = atlas.element_count() as usize;
         check_runs(runs, elements)?;
-        let gains = mix.shown(runs, exposure, tone.white());
-        let gains = gains.ok_or(RelightError::Range)?;
         Ok(Self {
             runs,
             elements,
             gains,
             tone,
         })
+    }
+
+    pub(super) const fn gains(&self) -> [Gain; 3] {
+        self.gains
     }
 
     /// Whether there are so many elements.
@@ -547,9 +581,10 @@ impl<'a, T: Encode> Finish<'a, T> {
         mut f: impl FnMut(&[E], [u16; 3]),
     ) -> Result<(), RelightError> {
         self.check(of_elements.len())?;
+        let gains = self.gains.map(Shown::new);
         for run in self.runs {
             let own = of_elements.split_off(..run.elements as usize);
-            let ([r, g, b], [gain_r, gain_g, gain_b]) = (run.reflectance, self.gains);
+            let ([r, g, b], [gain_r, gain_g, gain_b]) = (run.reflectance, gains);
             let factors = [gain_r.factor(r), gain_g.factor(g), gain_b.factor(b)];
             f(own.unwrap_or_default(), factors);
         }

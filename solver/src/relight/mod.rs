@@ -12,6 +12,7 @@
 //!   [`Curve`](crate::code::Curve) proves for the logarithmic code.
 
 mod by_light;
+mod fitted;
 mod fixed;
 mod float;
 mod frame;
@@ -24,6 +25,7 @@ use crate::atlas::Atlas;
 use crate::color::Rgb;
 
 pub use by_light::{add_lights, change_light, show_sums};
+pub use fitted::Fitted;
 pub use fixed::{FixedMix, FixedTable, FixedWeight, Terms, change_fixed, relight_fixed};
 pub use float::{DecodeTable, relight};
 pub use frame::{Encode, Finish, FrameLight, FrameMix, Run, STEPS};

@@ -547,6 +547,7 @@ impl<'a, F: Form> Sums<'a, F> {
     ///
     /// # Errors
     /// Another atlas, or no such light. Nothing has changed then.
+    #[inline(never)]
     pub fn change<const K: usize>(
         &mut self,
         atlas: &Atlas,
@@ -576,6 +577,7 @@ impl<'a, F: Form> Sums<'a, F> {
     ///
     /// # Errors
     /// Another atlas. Nothing has changed then.
+    #[inline(never)]
     pub fn apply<const K: usize>(&mut self, atlas: &Atlas, light: u32) -> Result<(), RelightError> {
         check_elements(atlas, self.sums.len())?;
         add_light::<F, K>(rows::<F, K>(atlas)?, light as usize, self.table, self.sums);

@@ -5,11 +5,14 @@ use core::hint::black_box;
 use relume::atlas::Atlas;
 use relume::color::Rgb;
 use relume::relight::{
-    AnyTable, Colour, Finish, Form, FrameLight, FrameMix, Run, Sums, fill_table, full, full_any,
+    AnyTable, Colour, Finish, Fitted, Form, FrameLight, FrameMix, Lum, Run, Sums, fill_table,
+    full, full_any,
 };
 use relume::tone::Rgb565Table;
 
-use crate::{count, exit, hash, largest_stack, paint_stack, say};
+use crate::{
+    Hash, count, count_with_pauses, exit, hash, largest_stack, paint_stack, say,
+};
 
 /// White at half of the steps: twice as bright is still told apart from more.
 static TONE: Rgb565Table = Rgb565Table::new(1024);
@@ -146,6 +149,63 @@ pub fn run_sums<F: Form, const K: usize>(
         must(sums.show(finish, pixels));
     });
     report(cold, cold, hash(pixels))
+}
+
+/// An atlas of `K` lights that a host fitted.
+pub struct FittedInput<const K: usize> {
+    /// Its bytes.
+    pub atlas: &'static [u8],
+    /// What the host found.
+    pub fitted: Fitted<K>,
+    /// Two mixes, in levels.
+    pub levels: [[[u16; 3]; K]; 2],
+    /// Reflectances.
+    pub runs: &'static [Run],
+}
+
+/// The instructions of a frame that is sent to a display in strips, and its hash, which nobody counts.
+#[inline(never)]
+fn count_strips(frame: &mut dyn FnMut(&mut dyn FnMut(&[u16]))) -> (u32, u32) {
+    let mut hash = Hash::new();
+    let counted = count_with_pauses(|pause| {
+        frame(&mut |strip| pause.during(|| hash.add(strip)));
+    });
+    (counted, hash.sum())
+}
+
+/// One changed light of an atlas that a host fitted, and back; a display is sent strips.
+pub fn run_change_fitted<const K: usize>(
+    input: &'static FittedInput<K>,
+    room: &'static mut [FrameLight; K],
+    sums: &'static mut [u32],
+    table: &'static mut <Lum as Form>::Table,
+    strip: &'static mut [u16],
+) -> ! {
+    paint_stack();
+    let [first, second] = input.levels.each_ref().map(volatile);
+    let light = CHANGED as usize;
+    let (Some(before), Some(after)) = (first.get(light), second.get(light)) else {
+        exit(1)
+    };
+    let atlas = &must(input.fitted.atlas(input.atlas));
+    let mix = &mut input.fitted.mix(room);
+    let finish = &must(input.fitted.finish(atlas, input.runs, &TONE));
+    set_all(mix, &first);
+    let mut kept = must(Sums::<Lum>::new::<K>(atlas, mix, sums, table));
+    let (_, unchanged) = count_strips(&mut |send| must(kept.show_strips(finish, strip, send)));
+    let (cold, changed) = count_strips(&mut |send| {
+        must(kept.change::<K>(atlas, mix, (CHANGED, *after)));
+        must(kept.show_strips(finish, strip, send));
+    });
+    one_index(strip, changed);
+    must(kept.set(atlas, mix, (CHANGED, *before)));
+    // What is left when the table is there already.
+    let (warm, undone) = count_strips(&mut |send| {
+        must(kept.apply::<K>(atlas, CHANGED));
+        must(kept.show_strips(finish, strip, send));
+    });
+    same(unchanged, undone);
+    report(cold, warm, changed)
 }
 
 /// One changed light, and back.
