@@ -67,22 +67,23 @@ impl<'a> Atlas<'a> {
     /// The same for an atlas that was found legal when it had this checksum: only the checksum is looked at again.
     ///
     /// # Errors
-    /// [`AtlasError::Checksum`] for other bytes, and what is wrong with their header.
+    /// [`AtlasError::Checksum`] for all other bytes.
     #[inline(never)]
     pub fn parse_known(bytes: &'a [u8], known: u32) -> Result<Self, AtlasError> {
-        let header = Header::parse(bytes)?;
+        // One error is enough, and less code.
+        let header = Header::parse(bytes).map_err(|_| AtlasError::Checksum)?;
         let found = checksum::<ExponentialCodes>(bytes);
         if header.checksum != known || found != Some(known) {
             return Err(AtlasError::Checksum);
         }
         let counts = header.counts;
         let (_, behind) = bytes.split_at_checked(HEADER_BYTES).unwrap_or_default();
-        let length = (counts.lights as usize).saturating_mul(LIGHT_BYTES);
+        let length = (counts.lights as usize).wrapping_mul(LIGHT_BYTES);
         let (lights, behind) = behind.split_at_checked(length).unwrap_or_default();
         let codes = behind.get(counts.names as usize..).unwrap_or_default();
         let codes_of = |light| code_at(lights, light).map_or(0, Code::bytes);
         let stride = (0..counts.lights).map(codes_of).sum::<usize>();
-        let length = (counts.elements as usize).saturating_mul(stride);
+        let length = (counts.elements as usize).wrapping_mul(stride);
         Ok(Self {
             checksum: known,
             quantity: header.quantity,

@@ -46,7 +46,7 @@ impl<const K: usize> Fitted<K> {
     /// The atlas that this was fitted to; what the host checked is not checked again, and names and mesh are left out.
     ///
     /// # Errors
-    /// [`AtlasError::Checksum`] for other bytes, and what else their header tells.
+    /// [`AtlasError::Checksum`] for other bytes.
     pub fn atlas<'a>(&self, bytes: &'a [u8]) -> Result<Atlas<'a>, AtlasError> {
         Atlas::parse_known(bytes, self.checksum)
     }

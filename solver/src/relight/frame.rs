@@ -462,7 +462,7 @@ impl FrameLight {
     #[inline(never)]
     fn weights(&self, bits: [u32; 3]) -> [Weight; 3] {
         let mut weights = [Weight::ZERO; 3];
-        let channels = weights.iter_mut().zip(self.gains);
+        let channels = weights.iter_mut().zip(&self.gains);
         for ((weight, gain), (level, bits)) in channels.zip(self.levels.iter().zip(bits)) {
             *weight = gain.weight(*level, bits);
         }
@@ -480,11 +480,7 @@ impl FrameLight {
 }
 
 /// Adds what the codes of a light contribute.
-fn add_terms<K: Known>(
-    sums: &mut [u32; 3],
-    (weights, values): &Terms,
-    codes: [impl Into<u16>; 3],
-) {
+fn add_terms<K: Known>(sums: &mut [u32; 3], (weights, values): &Terms, codes: [impl Into<u16>; 3]) {
     let terms = weights.iter().zip(values);
     for ((sum, (weight, values)), code) in sums.iter_mut().zip(terms).zip(codes) {
         *sum += weight.of(values.of::<K>(code.into()));

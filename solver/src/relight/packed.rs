@@ -14,6 +14,7 @@
 
 use core::array;
 use core::cell::Cell;
+use core::fmt;
 use core::hint::black_box;
 use core::mem;
 
@@ -48,11 +49,11 @@ pub trait Form {
     /// The codes that an atlas in this form may be in.
     type Known: Known;
     /// What all lights of the atlas are written in has so many bytes.
-    type Codes: Copy;
+    type Codes: Copy + fmt::Debug;
     /// The contribution of a light, or a sum of them.
-    type Sum: Copy + Default;
+    type Sum: Copy + Default + fmt::Debug;
     /// What every code contributes of a light.
-    type Table;
+    type Table: fmt::Debug;
 
     /// Bits of a sum.
     const BITS: [u32; 3];
@@ -396,7 +397,12 @@ fn show<F: Form, T: Encode>(sums: &[F::Sum], factors: [u16; 3], tone: &T, pixels
         show_group::<F, SHOWN, HAS_WIDE, T>(sums, factors, tone, pixels);
     });
     side_by_side(rest, rest_shown, |sum, pixel| {
-        show_group::<F, 1, HAS_WIDE, T>(array::from_ref(sum), factors, tone, array::from_mut(pixel));
+        show_group::<F, 1, HAS_WIDE, T>(
+            array::from_ref(sum),
+            factors,
+            tone,
+            array::from_mut(pixel),
+        );
     });
 }
 
@@ -472,21 +478,22 @@ fn as_it_is() {
     black_box(());
 }
 
-/// Sums of all elements, kept from frame to frame.
+/// Sums of all elements of an atlas of `K` lights, kept from frame to frame.
 #[derive(Debug)]
-pub struct Sums<'a, F: Form> {
+pub struct Sums<'a, F: Form, const K: usize> {
+    rows: &'a [[F::Codes; K]],
     sums: &'a mut [F::Sum],
     /// Of one light at a time.
     table: &'a mut F::Table,
 }
 
-impl<'a, F: Form> Sums<'a, F> {
-    /// Adds up a mix, light after light, in `sums` of one entry per element; `K` lights.
+impl<'a, F: Form, const K: usize> Sums<'a, F, K> {
+    /// Adds up a mix, light after light, in `sums` of one entry per element.
     ///
     /// # Errors
     /// A slice that does not fit the atlas; [`RelightError::Code`] for another form.
-    pub fn new<const K: usize>(
-        atlas: &Atlas,
+    pub fn new(
+        atlas: &Atlas<'a>,
         mix: &FrameMix,
         sums: &'a mut [F::Sum],
         table: &'a mut F::Table,
@@ -499,7 +506,7 @@ impl<'a, F: Form> Sums<'a, F> {
             fill_table::<F>(atlas, mix, light, table)?;
             add_light::<F, K>(rows, light as usize, table, sums);
         }
-        Ok(Self { sums, table })
+        Ok(Self { rows, sums, table })
     }
 
     /// The pixels of all elements.
@@ -546,18 +553,16 @@ impl<'a, F: Form> Sums<'a, F> {
     /// Sets the levels of one light, and corrects the sums for it: [`Self::set`] and [`Self::apply`].
     ///
     /// # Errors
-    /// Another atlas, or no such light. Nothing has changed then.
-    #[inline(never)]
-    pub fn change<const K: usize>(
+    /// [`RelightError::Lights`] without such a light. Nothing has changed then.
+    pub fn change(
         &mut self,
         atlas: &Atlas,
         mix: &mut FrameMix,
         (light, levels): (u32, [u16; 3]),
     ) -> Result<(), RelightError> {
-        check_elements(atlas, self.sums.len())?;
-        rows::<F, K>(atlas)?;
         self.set(atlas, mix, (light, levels))?;
-        self.apply::<K>(atlas, light)
+        self.apply(light);
+        Ok(())
     }
 
     /// Sets the levels of one light, and multiplies out by how much it changes; [`Self::apply`] must follow.
@@ -574,14 +579,8 @@ impl<'a, F: Form> Sums<'a, F> {
     }
 
     /// Corrects the sums for the light that was set.
-    ///
-    /// # Errors
-    /// Another atlas. Nothing has changed then.
-    #[inline(never)]
-    pub fn apply<const K: usize>(&mut self, atlas: &Atlas, light: u32) -> Result<(), RelightError> {
-        check_elements(atlas, self.sums.len())?;
-        add_light::<F, K>(rows::<F, K>(atlas)?, light as usize, self.table, self.sums);
-        Ok(())
+    pub fn apply(&mut self, light: u32) {
+        add_light::<F, K>(self.rows, light as usize, self.table, self.sums);
     }
 }
 

@@ -13,7 +13,7 @@ include!(concat!(env!("FIRMWARE_DATA"), "/lum_960x8_fitted.rs"));
 static ROOM: Lent<[FrameLight; 8]> = Lent::new([FrameLight::EMPTY; 8]);
 static SUMS: Lent<[u32; 960]> = Lent::new([0; 960]);
 static TABLE: Lent<<Lum as Form>::Table> = Lent::new(Lum::EMPTY);
-static STRIP: Lent<[u16; 240]> = Lent::new([0; 240]);
+static STRIP: Lent<[u16; 288]> = Lent::new([0; 288]);
 
 #[entry]
 fn main() -> ! {
