@@ -526,7 +526,7 @@ impl Header {
         }
         let image_width = input.u16().ok_or(short)?;
         debug_assert_eq!(CHECKSUM_AT, 20);
-        let words = input.take::<{ HEADER_BYTES - 16 }>().ok_or(short)?;
+        let words = input.0.get(..HEADER_BYTES - 16).ok_or(short)?;
         let (words, _) = words.as_chunks::<4>();
         let mut words = words.iter().map(|word| u32::from_le_bytes(*word));
         let mut next = || words.next().ok_or(short);

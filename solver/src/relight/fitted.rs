@@ -35,10 +35,11 @@ impl<const K: usize> Fitted<K> {
     ) -> Result<Self, RelightError> {
         let mut room = [FrameLight::EMPTY; K];
         let mix = FrameMix::exponential(atlas, full, &mut room)?;
-        let finish = Finish::new(atlas, &mix, runs, exposure, tone)?;
+        Finish::new(atlas, &mix, runs, exposure, tone)?;
+        let shown = mix.shown(runs, exposure, tone.white());
         Ok(Self {
             checksum: atlas.checksum(),
-            shown: finish.gains().map(Gain::parts),
+            shown: shown.ok_or(RelightError::Range)?.map(Gain::parts),
             gains: room.map(|light| light.gains().map(Gain::parts)),
         })
     }

@@ -388,7 +388,7 @@ impl<'a> FrameMix<'a> {
 
     /// The gains of [`Finish`]; `None` where its error is [`RelightError::Range`].
     #[inline(never)]
-    fn shown(&self, runs: &[Run], exposure: f32, white: u16) -> Option<[Gain; 3]> {
+    pub(super) fn shown(&self, runs: &[Run], exposure: f32, white: u16) -> Option<[Gain; 3]> {
         let is_positive = (1..0x7f80_0000).contains(&exposure.to_bits());
         let white = Wide::new(white.into(), -(STEPS.ilog2() as i32));
         let shown = Wide::from_float(exposure).times(Wide::from_float(FRAC_1_PI));
@@ -517,7 +517,7 @@ pub struct Finish<'a, T> {
     runs: &'a [Run],
     /// Of all runs.
     elements: usize,
-    gains: [Gain; 3],
+    gains: [Shown; 3],
     pub(super) tone: &'a T,
 }
 
@@ -550,13 +550,9 @@ impl<'a, T: Encode> Finish<'a, T> {
         Ok(Self {
             runs,
             elements,
-            gains,
+            gains: gains.map(Shown::new),
             tone,
         })
-    }
-
-    pub(super) const fn gains(&self) -> [Gain; 3] {
-        self.gains
     }
 
     /// Whether there are so many elements.
@@ -577,10 +573,9 @@ impl<'a, T: Encode> Finish<'a, T> {
         mut f: impl FnMut(&[E], [u16; 3]),
     ) -> Result<(), RelightError> {
         self.check(of_elements.len())?;
-        let gains = self.gains.map(Shown::new);
         for run in self.runs {
             let own = of_elements.split_off(..run.elements as usize);
-            let ([r, g, b], [gain_r, gain_g, gain_b]) = (run.reflectance, gains);
+            let ([r, g, b], [gain_r, gain_g, gain_b]) = (run.reflectance, self.gains);
             let factors = [gain_r.factor(r), gain_g.factor(g), gain_b.factor(b)];
             f(own.unwrap_or_default(), factors);
         }

@@ -38,12 +38,6 @@ pub(super) const HAS_WIDE: bool = !IS_SMALL;
 /// Elements that look for a table together.
 const GROUP: usize = if IS_SMALL { 1 } else { 2 };
 
-/// Sums that are shown together.
-const SHOWN: usize = 4;
-
-/// Sums that a light is added to together.
-const ADDED: usize = 4;
-
 /// How the codes of an element are stored, and their contributions summed.
 pub trait Form {
     /// The codes that an atlas in this form may be in.
@@ -381,7 +375,9 @@ fn full_group<F: Form, const K: usize, const N: usize, T: Encode>(
             }
         }
     }
-    show_group::<F, N, false, T>(&sums, factors, tone, pixels);
+    for (sum, pixel) in sums.into_iter().zip(pixels) {
+        show_one::<F, false, T>(sum, factors, tone, pixel);
+    }
 }
 
 /// The pixels of some sums.
@@ -391,32 +387,29 @@ fn show<F: Form, T: Encode>(sums: &[F::Sum], factors: [u16; 3], tone: &T, pixels
     if IS_SMALL {
         factors.stay_in_memory();
     }
-    let (groups, rest) = sums.as_chunks::<SHOWN>();
+    // Written out, because a compiler that saves flash unrolls no loop.
+    let (groups, rest) = sums.as_chunks();
     let (shown, rest_shown) = pixels.as_chunks_mut();
-    side_by_side(groups, shown, |sums, pixels| {
-        show_group::<F, SHOWN, HAS_WIDE, T>(sums, factors, tone, pixels);
+    side_by_side(groups, shown, |[a, b, c, d], [w, x, y, z]| {
+        show_one::<F, HAS_WIDE, T>(*a, factors, tone, w);
+        show_one::<F, HAS_WIDE, T>(*b, factors, tone, x);
+        show_one::<F, HAS_WIDE, T>(*c, factors, tone, y);
+        show_one::<F, HAS_WIDE, T>(*d, factors, tone, z);
     });
     side_by_side(rest, rest_shown, |sum, pixel| {
-        show_group::<F, 1, HAS_WIDE, T>(
-            array::from_ref(sum),
-            factors,
-            tone,
-            array::from_mut(pixel),
-        );
+        show_one::<F, HAS_WIDE, T>(*sum, factors, tone, pixel);
     });
 }
 
 #[inline(always)]
-fn show_group<F: Form, const N: usize, const WIDE: bool, T: Encode>(
-    sums: &[F::Sum; N],
+fn show_one<F: Form, const WIDE: bool, T: Encode>(
+    sum: F::Sum,
     factors: &Factors,
     tone: &T,
-    pixels: &mut [T::Pixel; N],
+    pixel: &mut T::Pixel,
 ) {
-    for (sum, pixel) in sums.iter().zip(pixels) {
-        *pixel = tone.encode(factors.steps::<F, T, WIDE>(*sum));
-        as_it_is();
-    }
+    *pixel = tone.encode(factors.steps::<F, T, WIDE>(sum));
+    as_it_is();
 }
 
 /// Adds one light to the sums of some elements.
@@ -430,27 +423,28 @@ fn add_light<F: Form, const K: usize>(
     if light >= K {
         return;
     }
-    let (groups, rest) = rows.as_chunks::<ADDED>();
+    let (groups, rest) = rows.as_chunks();
     let (added, rest_added) = sums.as_chunks_mut();
-    side_by_side(groups, added, |rows, sums| {
-        add_group::<F, K, ADDED>(rows, light, table, sums);
+    side_by_side(groups, added, |[a, b, c, d], [w, x, y, z]| {
+        add_one::<F, K>(a, light, table, w);
+        add_one::<F, K>(b, light, table, x);
+        add_one::<F, K>(c, light, table, y);
+        add_one::<F, K>(d, light, table, z);
     });
     side_by_side(rest, rest_added, |row, sum| {
-        add_group::<F, K, 1>(array::from_ref(row), light, table, array::from_mut(sum));
+        add_one::<F, K>(row, light, table, sum)
     });
 }
 
 #[inline(always)]
-fn add_group<F: Form, const K: usize, const N: usize>(
-    rows: &[[F::Codes; K]; N],
+fn add_one<F: Form, const K: usize>(
+    row: &[F::Codes; K],
     light: usize,
     table: &F::Table,
-    sums: &mut [F::Sum; N],
+    sum: &mut F::Sum,
 ) {
-    for (sum, row) in sums.iter_mut().zip(rows) {
-        if let Some(codes) = row.get(light) {
-            *sum = F::add(*sum, table, codes);
-        }
+    if let Some(codes) = row.get(light) {
+        *sum = F::add(*sum, table, codes);
     }
 }
 

@@ -5,14 +5,12 @@ use core::hint::black_box;
 use relume::atlas::Atlas;
 use relume::color::Rgb;
 use relume::relight::{
-    AnyTable, Colour, Finish, Fitted, Form, FrameLight, FrameMix, Lum, Run, Sums, fill_table,
-    full, full_any,
+    AnyTable, Colour, Finish, Fitted, Form, FrameLight, FrameMix, Lum, Run, Sums, fill_table, full,
+    full_any,
 };
 use relume::tone::Rgb565Table;
 
-use crate::{
-    Hash, count, count_with_pauses, exit, hash, largest_stack, paint_stack, say,
-};
+use crate::{Hash, count, count_with_pauses, exit, hash, largest_stack, paint_stack, say};
 
 /// White at half of the steps: twice as bright is still told apart from more.
 static TONE: Rgb565Table = Rgb565Table::new(1024);
@@ -53,7 +51,11 @@ fn same(a: u32, b: u32) {
 #[inline(never)]
 fn volatile<const K: usize>(levels: &[[u16; 3]; K]) -> [[u16; 3]; K] {
     let mut read = [[0; 3]; K];
-    for (to, from) in read.as_flattened_mut().iter_mut().zip(levels.as_flattened()) {
+    for (to, from) in read
+        .as_flattened_mut()
+        .iter_mut()
+        .zip(levels.as_flattened())
+    {
         // SAFETY: a reference to a plain value.
         *to = unsafe { core::ptr::read_volatile(from) };
         black_box(());
@@ -170,14 +172,30 @@ pub struct FittedInput<const K: usize> {
     pub runs: &'static [Run],
 }
 
-/// The instructions of a frame that is sent to a display in strips, and its hash, which nobody counts.
+/// A frame that is sent to a display, strip after strip.
+type Sent<'a> = &'a mut dyn FnMut(&mut dyn FnMut(&[u16]));
+
+/// The instructions of a frame, and its hash; nothing of what makes the hash is counted.
 #[inline(never)]
-fn count_strips(frame: &mut dyn FnMut(&mut dyn FnMut(&[u16]))) -> (u32, u32) {
-    let mut hash = Hash::new();
-    let counted = count_with_pauses(|pause| {
-        frame(&mut |strip| pause.during(|| hash.add(strip)));
+fn count_strips(frame: Sent) -> (u32, u32) {
+    let (mut hash, mut strips) = (Hash::new(), 0);
+    let mut counted = |frame: Sent| {
+        let counted = count_with_pauses(|pause| {
+            frame(&mut |strip| {
+                strips += 1;
+                pause.during(|| hash.add(strip));
+            });
+        });
+        (counted, core::mem::take(&mut strips))
+    };
+    // What a strip of nothing takes.
+    let (one, _) = counted(&mut |send| send(&[]));
+    let (two, _) = counted(&mut |send| {
+        send(&[]);
+        send(&[]);
     });
-    (counted, hash.sum())
+    let (all, strips) = counted(frame);
+    (all - strips * (two - one), hash.sum())
 }
 
 /// One changed light of an atlas that a host fitted, and back; a display is sent strips.

@@ -18,13 +18,5 @@ static STRIP: Lent<[u16; 288]> = Lent::new([0; 288]);
 #[entry]
 fn main() -> ! {
     // SAFETY: once.
-    unsafe {
-        run_change_fitted::<8>(
-            &INPUT,
-            ROOM.lend(),
-            SUMS.lend(),
-            TABLE.lend(),
-            STRIP.lend(),
-        )
-    }
+    unsafe { run_change_fitted::<8>(&INPUT, ROOM.lend(), SUMS.lend(), TABLE.lend(), STRIP.lend()) }
 }
