@@ -8,7 +8,7 @@
 //! * [`Colour`]: a table of 256 for each channel, in 16 bits.
 //!
 //! [`full`] adds up `K` tables; [`Sums`] keeps what was added, for lights that change one at a time or
-//! whose tables do not fit into memory together. Sums wrap, so undoing a change restores the same bits.
+//! whose tables do not fit into memory together, and sends a display whole frames or strips of them. Sums wrap, so undoing a change restores the same bits.
 //! `K` is a constant because it halves the instructions. Any mixture of codes, tiles above all, goes through [`full_any`],
 //! which decodes first.
 
@@ -33,6 +33,8 @@ const SINGLE: u32 = 16;
 /// Whether this is a core of eight registers, ARMv6-M: of the ones that are supported, it alone has no compare-and-swap. Its
 /// loops are cut in another way; what they compute is the same.
 const IS_SMALL: bool = !cfg!(target_has_atomic = "32");
+
+/// Whether a core multiplies two words into two in one instruction.
 pub(super) const HAS_WIDE: bool = !IS_SMALL;
 
 /// Elements that look for a table together.
@@ -135,10 +137,11 @@ impl Form for Lum {
         before: Option<[Weight; 3]>,
         after: [Weight; 3],
     ) -> Result<(), RelightError> {
-        let mut kept = 0;
-        for weights in before.iter().chain([&after]) {
-            fill_packed(table, weights, kept);
-            kept = u32::MAX;
+        if let Some(before) = before {
+            fill_packed(table, &before, 0);
+            fill_packed(table, &after, u32::MAX);
+        } else {
+            fill_packed(table, &after, 0);
         }
         Ok(())
     }
@@ -239,15 +242,14 @@ impl Factors {
     #[inline(always)]
     pub(super) fn new<F: Form>(factors: [u16; 3]) -> Self {
         let ([r, g, b], [bits_r, bits_g, bits_b]) = (factors.map(u32::from), F::SHOWN);
-        let factors = Self([
+        Self([
             Cell::new(r << (16 - bits_r)),
             Cell::new(g << (16 - bits_g)),
             Cell::new(b << (16 - bits_b)),
-        ]);
-        factors
+        ])
     }
 
-    /// Keeps the compiler of a small core from filling its registers with factors, which its stack gives as fast.
+    /// Keeps the compiler from filling registers with factors, which the stack gives as fast.
     #[inline(always)]
     fn stay_in_memory(&self) {
         black_box(self);
