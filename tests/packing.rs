@@ -142,26 +142,24 @@ fn sixty_four_lights_take_less_than_the_paper_took_for_eight() {
     }
 }
 
-/// Bakes 8640 elements of 64 and of 256 lights: minutes of CPU.
-///
-/// All aims of the issue but one are kept: `tiles-log` of 256 lights takes 10.64 bits, not 10. What the rays of so many
-/// dim lights leave to chance takes bits: baked with `--method rows` the same room takes 9.4, and 7.0 in `tiles`.
+/// Bakes 8640 elements of 64 and of 256 lights: two minutes of CPU. The aims are those of the issue.
 #[test]
 #[ignore = "slow: run it by name"]
 fn eight_bits_hold_an_element_on_the_fine_mesh() {
-    let aims = [("seed_room_64", 8.0, 10.0), ("seed_room_256", 8.0, 10.7)];
-    for (name, tiles, tiles_log) in aims {
+    for name in ["seed_room_64", "seed_room_256"] {
         let Some(room) = bake_scene(name, Some(0.083_333_3)) else {
             return;
         };
         assert_eq!(room.mesh.elements.len(), 8640);
         let (bytes, error) = packed(&room, Code::Tiles);
         let found = bits(&bytes, &room);
-        assert!(found <= tiles, "{name}: {found} bits");
+        println!("{name}: {found} bits in tiles, {error:?}");
+        assert!(found <= 8.0, "{name}: {found} bits");
         assert!(error.achromatic.packed <= 1.0, "{name}: {error:?}");
         let (bytes, error) = packed(&room, Code::TilesLog);
         let found = bits(&bytes, &room);
-        assert!(found <= tiles_log, "{name}: {found} bits");
+        println!("{name}: {found} bits in tiles-log, {error:?}");
+        assert!(found <= 10.0, "{name}: {found} bits");
         assert!(error.largest() <= 1.0, "{name}: {error:?}");
         for lights in COUNTS.into_iter().filter(|k| *k <= room.lights.len()) {
             let (_, error) = packed(&first(&room, lights), Code::Display8);
@@ -183,6 +181,20 @@ fn a_real_scene_is_packed_within_a_code() {
     assert!(error.largest() <= 1.0, "{error:?}");
     let (log, _) = packed(&scene, Code::TilesLog);
     assert!(bytes.len() <= log.len(), "{} {}", bytes.len(), log.len());
+}
+
+/// Their darkest places are dark in all lights, and all lights are off the same way there.
+#[test]
+fn display8_is_two_codes_off_in_real_scenes() {
+    for name in ["bevy_cornell", "gazebo"] {
+        let Some(scene) = bake_scene(name, None) else {
+            return;
+        };
+        let (_, error) = packed(&scene, Code::Display8);
+        println!("{name}: {error:?}");
+        assert!(error.achromatic.packed <= 2.0, "{name}: {error:?}");
+        assert!(error.all.packed <= 3.0, "{name}: {error:?}");
+    }
 }
 
 /// A closed box that is seen from inside, 4 x 3 x 3, with a lamp under its ceiling.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use relume::atlas::{Atlas, LARGEST_SIDE, Quantity, Tiles};
+use relume::atlas::{Atlas, Quantity, Tiles};
 use relume::code::{Curve, LOG_STEPS};
 use relume::relight::FixedWeight;
 use serde_json::{Value, json};
@@ -149,14 +149,11 @@ fn curve(curve: Curve) -> Value {
 /// Bits of every light in all tiles, without their offsets.
 fn bits_in_tiles(atlas: &Atlas) -> Vec<usize> {
     let mut bits = vec![0; atlas.light_count() as usize];
-    let mut block = [[0; 3]; LARGEST_SIDE * LARGEST_SIDE];
     for (place, mut tile) in atlas.tiles().iter().flat_map(Tiles::iter) {
-        for (bits, light) in bits.iter_mut().zip(atlas.lights()) {
-            if light.code.is_tiled() {
-                let before = tile.remaining();
-                tile.next_light(place, light.last, &mut block);
-                *bits += before.saturating_sub(tile.remaining());
-            }
+        for light in atlas.lights_in_tiles() {
+            let before = tile.remaining();
+            tile.next_light(place);
+            bits[light as usize] += before.saturating_sub(tile.remaining());
         }
     }
     bits

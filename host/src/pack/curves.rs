@@ -2,31 +2,19 @@
 //!
 //! `exp8` has one scale, as published; `exp8s` and `lum8` put the largest value of a light at their top.
 //! `display8` has 256 levels for every channel of a light, in 16 parts of equal steps (see [`Curve::Parts`]). A level may
-//! stand for a value where it bears that, at a tolerance `t` and in
-//!
-//! * the light alone in its own colour, where `2 t` display codes are bearable,
-//! * the channel alone, where `3 t` are: then the exposure follows the luminance, `0.2126 R + 0.7152 G + 0.0722 B`, and blue is
-//!   up to 14 times overexposed,
-//! * the light among all others at their nominal emission, 16 times overexposed, where `3 t` are,
-//! * all three of what is shown, with the reflectance of the element, where half as much again is bearable,
-//! * above white any state, if the relative error times 112.09 is at most `2.1 t`: that is the display error where this light is
-//!   dimmed among others and dominates an element.
-//!
-//! So every value has an interval, and each part in turn takes the longest steps with which a level falls into all intervals
+//! stand for a value where it [bears](super::bearable) that at a tolerance `t`. So every value has an interval, and each part in turn takes the longest steps with which a level falls into all intervals
 //! that begin before its end: where values are rare, above all in hot spots, levels are too. The least `t` with
-//! which the levels suffice is searched. All mixes of several lights are left out of this: what they are off by
-//! is a mean of what their lights are off by, each of which rounds for itself.
+//! which the levels suffice is searched.
 
 use rayon::prelude::*;
-use relume::atlas::{LARGEST_TILE_CODE, LightEntry, Quantity};
+use relume::atlas::{LARGEST_TILE_CODE, LightEntry};
 use relume::code::{
     Code, Curve, LARGEST_PART_FIRST, LARGEST_PART_UNIT, PART_CODES, PART_STEPS, PARTS, Scale,
-    srgb_linear,
 };
 use relume::color::Rgb;
 
+use super::bearable::{Sample, Stage, all_on, continued_code};
 use super::{PackError, Packing, Source};
-use crate::display_error::{Solo, shown_code};
 use crate::picture::white;
 use crate::solution::Solution;
 
@@ -38,33 +26,11 @@ const WHITES: u8 = 18;
 const LEAST_TOLERANCE: f32 = 1e-3;
 const MOST_TOLERANCE: f32 = 64.0;
 
+/// The part of a tolerance that the first level takes.
+const DARKEST: f32 = 0.25;
+
 /// Ratio of two tolerances that are not told apart.
 const TOLERANCE: f32 = 1.01;
-
-/// Display codes per relative error at white: `255 * 1.055 / 2.4`.
-const CODES_PER_RATIO: f32 = 112.093_75;
-
-/// A light of one channel only.
-const PRIMARIES: [Rgb; 3] = [
-    Rgb::new(1.0, 0.0, 0.0),
-    Rgb::new(0.0, 1.0, 0.0),
-    Rgb::new(0.0, 0.0, 1.0),
-];
-
-/// Bearable display errors of a light alone, in its colour and in a primary, and among all others when overexposed.
-const BEARABLE: [f32; STATES] = [2.0, 3.0, 3.0];
-
-/// Exposure in the last of these states, over that which suits it.
-const OVEREXPOSED: f32 = 16.0;
-
-/// States in which a value is judged.
-const STATES: usize = 3;
-
-/// How much more is bearable of what is shown.
-const MORE_SHOWN: f32 = 1.5;
-
-/// Bearable relative error above white, times [`CODES_PER_RATIO`].
-const BEARABLE_RATIO: f32 = 2.1;
 
 /// The lights with their curves; a packing per light.
 pub(super) fn entries<'a>(
@@ -168,66 +134,17 @@ fn common_scales(solution: &Solution, values: &[Rgb]) -> Vec<Option<Scale>> {
         .collect()
 }
 
-/// The state of all lights at their nominal emission.
-fn all_on<'a>(solution: &Solution, values: &'a [Rgb]) -> impl Iterator<Item = Rgb> + Clone + 'a {
-    let nominal = solution.nominal_mix();
-    values.chunks(nominal.len().max(1)).map(move |values| {
-        let weighted = values.iter().zip(&nominal);
-        weighted.fold(Rgb::BLACK, |sum, (value, weight)| sum + *value * *weight)
-    })
-}
-
-/// What `display8` needs to know of all lights together.
-struct Stage {
-    /// Reflectances of the elements, 1 where they are multiplied in.
-    reflectances: Vec<Rgb>,
-    /// What shows as white with all lights on, 16 times overexposed: packed and shown.
-    overexposed: [f32; 2],
-}
-
-impl Stage {
-    fn new(source: &Source) -> Self {
-        let solution = source.solution;
-        let reflectances: Vec<Rgb> = match source.quantity {
-            Quantity::Irradiance => {
-                let elements = solution.mesh.elements.iter();
-                elements.map(|element| element.reflectance).collect()
-            }
-            Quantity::Radiosity | Quantity::Radiance => {
-                vec![Rgb::WHITE; solution.element_count()]
-            }
-        };
-        let all_on: Vec<Rgb> = all_on(solution, &source.values).collect();
-        let overexposed = whites(all_on.iter().copied(), &reflectances);
-        Self {
-            reflectances,
-            overexposed: overexposed.map(|white| white / OVEREXPOSED),
-        }
-    }
-}
-
-/// What shows as white in a state: packed and shown.
-fn whites(lit: impl Iterator<Item = Rgb> + Clone, reflectances: &[Rgb]) -> [f32; 2] {
-    let shown = lit.clone().zip(reflectances);
-    [white(lit), white(shown.map(|(value, rho)| value * *rho))]
-}
-
 /// The best display curve of each channel of a light.
 fn display_curves(stage: &Stage, own: &[Rgb], emission: Rgb) -> [Option<Curve>; 3] {
-    let alone = |weight: Rgb| whites(own.iter().map(|value| *value * weight), &stage.reflectances);
-    let nominal = Solo::Nominal.weight(emission);
-    let in_nominal = alone(nominal);
+    let states = stage.states(own, emission);
     [0, 1, 2].map(|channel| {
         let at = |rgb: Rgb| rgb.to_array()[channel];
-        // A light that lacks this channel shows it in its primary only.
-        let nominal = in_nominal.map(|white| white / at(nominal));
-        let overexposed = stage.overexposed.map(|white| white / at(emission));
-        let states = [nominal, alone(PRIMARIES[channel]), overexposed];
+        let states = states[channel];
         let places = own.iter().zip(&stage.reflectances);
         let samples = places
             .map(|(value, rho)| Sample::new(at(*value), at(*rho), states))
             .collect();
-        display_curve(samples, nominal[0].min(white(own.iter().copied())))
+        display_curve(samples, states[0][0].min(white(own.iter().copied())))
     })
 }
 
@@ -275,9 +192,11 @@ fn parts(samples: &[Sample], white: Scale, tolerance: f32) -> Option<Curve> {
     let unit = |value: f32| 4096.0 * continued_code(value / white.value());
     let intervals = samples.iter().map(|s| s.interval(tolerance).map(unit));
     let mut intervals: Vec<[f32; 2]> = intervals.collect();
+    // Where all lights are dark they are all off the same way: the first level takes a part of what is bearable.
+    let ends = samples.iter().zip(&intervals).map(|(s, [_, end])| (s, end));
+    let (darkest, _) = ends.min_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    let first = (unit(darkest.interval(DARKEST * tolerance)[1]) / 256.0).floor();
     intervals.sort_unstable_by(|[a, _], [b, _]| a.total_cmp(b));
-    let start = intervals.iter().map(|[_, to]| *to);
-    let first = (start.fold(f32::INFINITY, f32::min).max(0.0) / 256.0).floor();
     if first > f32::from(LARGEST_PART_FIRST) {
         return None;
     }
@@ -323,76 +242,4 @@ fn steps(intervals: &[[f32; 2]], first: f32, unit: u8) -> Option<[u8; PARTS / 2]
     }
     let is_reached = open.last().is_none_or(|[low, _]| *low <= last);
     is_reached.then_some(steps)
-}
-
-/// The display code of a value over white, above it too; within 3e-4.
-fn continued_code(u: f32) -> f32 {
-    if u < 1.0 {
-        shown_code(u)
-    } else {
-        255.0 + CODES_PER_RATIO * u.ln()
-    }
-}
-
-/// A value for which levels are sought.
-#[derive(Clone, Copy)]
-struct Sample {
-    value: f32,
-    /// What shows it as white in every state, packed and shown.
-    whites: [[f32; 2]; STATES],
-    /// Its display codes then.
-    shown: [[f32; 2]; STATES],
-}
-
-impl Sample {
-    /// A value on a reflectance, with the whites of its light.
-    fn new(value: f32, reflectance: f32, whites: [[f32; 2]; STATES]) -> Self {
-        let whites = whites.map(|[packed, shown]| [packed, shown / reflectance]);
-        Self {
-            value,
-            whites,
-            shown: whites.map(|whites| whites.map(|white| shown_code(value / white))),
-        }
-    }
-
-    /// From the smallest to the largest value that may take its place.
-    fn interval(&self, tolerance: f32) -> [f32; 2] {
-        let [mut low, mut high] = [0.0_f32, f32::INFINITY];
-        if self.value > self.whites[0][0] {
-            let ratio = tolerance * BEARABLE_RATIO / CODES_PER_RATIO;
-            [low, high] = [self.value * (1.0 - ratio), self.value * (1.0 + ratio)];
-        }
-        let bearable = BEARABLE.map(|codes| [codes * tolerance, codes * tolerance * MORE_SHOWN]);
-        let states = self.whites.iter().zip(&self.shown).zip(&bearable);
-        let states = states.flat_map(|((whites, shown), bearable)| {
-            whites
-                .iter()
-                .zip(shown)
-                .zip(bearable)
-                .map(|((w, s), b)| (*w, *s, *b))
-        });
-        // A colour or a place that shows nothing bears everything.
-        for (white, shown, bearable) in
-            states.filter(|(white, ..)| white.is_finite() && *white > 0.0)
-        {
-            low = low.max(white * linear(shown - bearable));
-            // The nearest level is taken, even where one that is clipped would do better.
-            if shown < WHITEST {
-                high = high.min(white * linear(shown + bearable));
-            }
-        }
-        [low.min(self.value), high.max(self.value)]
-    }
-}
-
-/// The display code of white.
-const WHITEST: f32 = 255.0;
-
-/// The value over white of a display code, above white too.
-fn linear(code: f32) -> f32 {
-    if code < WHITEST {
-        srgb_linear((code.max(0.0) * 4096.0) as u32) as f32 / 2_147_483_648.0
-    } else {
-        ((code - WHITEST) / CODES_PER_RATIO).exp()
-    }
 }

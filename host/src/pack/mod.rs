@@ -1,8 +1,11 @@
 //! From a solution to an atlas and back, and what the packing costs.
 
+mod bearable;
 mod choose;
 mod curves;
 mod measure;
+mod order;
+mod rounding;
 mod tiles;
 mod unpack;
 
@@ -211,17 +214,21 @@ impl<'a> Source<'a> {
 struct Packed<'a> {
     source: &'a Source<'a>,
     entries: Vec<LightEntry<'a>>,
+    /// What is encoded in the place of the source's values.
+    values: Cow<'a, [Rgb]>,
     tiles: Vec<u8>,
 }
 
 impl<'a> Packed<'a> {
     /// Encodes a source, each light in a packing of its own.
-    fn new(source: &'a Source, packings: &[Packing]) -> Result<Self, PackError> {
+    fn new(source: &'a Source<'a>, packings: &[Packing]) -> Result<Self, PackError> {
         let entries = curves::entries(source, packings)?;
-        let tiles = tiles::encode(source.solution, &entries, &source.values);
+        let values = rounding::rounded(source, &entries);
+        let tiles = tiles::encode(source.solution, &entries, &values);
         Ok(Self {
             source,
             entries,
+            values,
             tiles,
         })
     }
@@ -256,7 +263,7 @@ impl<'a> Packed<'a> {
         let errors = error.map(|error| (error.all, &error.per_light[..]));
         let contents = self.contents(with_mesh, errors);
         let mut bytes = vec![0; atlas::size(&contents)?];
-        let (lights, values) = (self.entries.len(), &self.source.values);
+        let (lights, values) = (self.entries.len(), &self.values);
         let contribution =
             |element: u32, light: u32| values[element as usize * lights + light as usize];
         atlas::write(&contents, contribution, &mut bytes)?;

@@ -42,8 +42,8 @@ use glam::Vec2;
 
 pub use read::{Atlas, AtlasMesh};
 pub use tiles::{
-    Block, ESCAPE, FIRST_BITS, FULL_BITS, LARGEST_SIDE, PREDICTED, Place, Predictor, TileBits,
-    Tiles, places,
+    ESCAPE, FIRST_BITS, FULL_BITS, GROUP, LARGEST_SIDE, PREDICTED, Place, Predictor, Share,
+    TileBits, Tiles, places,
 };
 pub use write::{Contents, LightEntry, size, write};
 
@@ -55,7 +55,7 @@ use crate::scene::Emission;
 
 /// How an atlas starts.
 pub const MAGIC: [u8; 8] = *b"RELUMEAT";
-const VERSION: u16 = 3;
+const VERSION: u16 = 4;
 const HEADER_BYTES: usize = 56;
 const CHECKSUM_AT: usize = 20;
 const LIGHT_BYTES: usize = 64;

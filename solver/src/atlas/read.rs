@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::tiles::{Block, LARGEST_SIDE, Tiles};
+use super::tiles::Tiles;
 use super::{
     AtlasElement, AtlasError, AtlasFace, AtlasLight, CHECKSUM_AT, CODE_AT, CURVE_BYTES, CURVES_AT,
     CountsOf, ELEMENT_BYTES, FACE_BYTES, HEADER_BYTES, LARGEST_TILE_CODE, LIGHT_BYTES, MAGIC,
@@ -152,8 +152,8 @@ impl<'a> Atlas<'a> {
         if tiles.is_empty() == is_tiled {
             return Err(AtlasError::Illegal("table of tiles"));
         }
-        let tiles =
-            (!K::ONLY_EXPONENTIAL && is_tiled).then(|| Tiles::parse(tiles, counts.elements));
+        let tiles = (!K::ONLY_EXPONENTIAL && is_tiled)
+            .then(|| Tiles::parse(tiles, counts.elements, counts.lights));
         let atlas = Self {
             checksum: header.checksum,
             quantity: header.quantity,
@@ -302,10 +302,18 @@ impl<'a> Atlas<'a> {
         self.tiles
     }
 
+    /// Tags of the lights in tiles, in the order of a tile's bits.
+    pub fn lights_in_tiles(&self) -> impl Iterator<Item = u32> + use<'a> {
+        let lights = self.lights;
+        let is_tiled = move |tag: &u32| code_at(lights, *tag).is_some_and(Code::is_tiled);
+        let order = self.tiles.into_iter().flat_map(|tiles| tiles.order());
+        order.filter(is_tiled)
+    }
+
     /// Calls `f(element, light, codes)` for every contribution, except that a light in tiles is left out where all its codes
     /// are 0. Codes stand for red, green and blue, and are at most the light's last ones.
     ///
-    /// Every element meets its lights in the order of their tags, those in tiles last.
+    /// Every element meets its lights in the order of their tags; those in tiles come last, in an order of their own.
     pub fn for_each(&self, mut f: impl FnMut(u32, u32, [u16; 3])) {
         if self.stride > 0 {
             let rows = self.codes.chunks_exact(self.stride).zip(0..);
@@ -313,23 +321,18 @@ impl<'a> Atlas<'a> {
                 self.for_each_in_row(row, |l, codes| f(element, l, codes))
             });
         }
-        self.for_each_in_tiles(self.counts.lights, f);
+        self.for_each_in_tiles(None, f);
     }
 
     /// The same for one light, `f(element, codes)`.
     ///
-    /// In tiles, the bits of the lights before it are read, too.
+    /// In tiles, the bits of those before it are read, too.
     pub fn for_each_of(&self, light: u32, mut f: impl FnMut(u32, [u16; 3])) {
         let Some(code) = code_at(self.lights, light) else {
             return;
         };
         if code.is_tiled() {
-            let lights = light + 1;
-            return self.for_each_in_tiles(lights, |element, l, codes| {
-                if l == light {
-                    f(element, codes);
-                }
-            });
+            return self.for_each_in_tiles(Some(light), |element, _, codes| f(element, codes));
         }
         let before = (0..light).filter_map(|tag| code_at(self.lights, tag));
         let start = before.map(Code::bytes).sum();
@@ -358,18 +361,21 @@ impl<'a> Atlas<'a> {
         }
     }
 
-    /// The first so many lights, those in tiles.
-    fn for_each_in_tiles(&self, lights: u32, mut f: impl FnMut(u32, u32, [u16; 3])) {
+    /// The lights in tiles; with `only`, that one by itself.
+    fn for_each_in_tiles(&self, only: Option<u32>, mut f: impl FnMut(u32, u32, [u16; 3])) {
         let Some(tiles) = self.tiles else {
             return;
         };
-        let mut block: Block = [[0; 3]; LARGEST_SIDE * LARGEST_SIDE];
         for (place, mut bits) in tiles.iter() {
-            for (record, light) in self.records().zip(0..lights) {
-                let is_tiled = code_of(record).is_some_and(Code::is_tiled);
-                if is_tiled && bits.next_light(place, last_codes(record), &mut block) {
-                    let elements = place.elements().zip(&block);
-                    elements.for_each(|(element, codes)| f(element, light, *codes));
+            for light in self.lights_in_tiles() {
+                let is_lit = bits.next_light(place);
+                if is_lit && only.is_none_or(|only| only == light) {
+                    let last = last_codes(record(self.lights, light, LIGHT_BYTES));
+                    let elements = place.elements().zip(bits.codes(last));
+                    elements.for_each(|(element, codes)| f(element, light, codes));
+                }
+                if only == Some(light) {
+                    break;
                 }
             }
         }
@@ -653,7 +659,7 @@ fn code_of(record: &[u8; LIGHT_BYTES]) -> Option<Code> {
 }
 
 /// The last codes of a light, without looking at the rest.
-fn last_codes(record: &[u8; LIGHT_BYTES]) -> [u16; 3] {
+fn last_codes(record: &[u8]) -> [u16; 3] {
     let curves = record.get(CURVES_AT..).unwrap_or_default();
     let mut last = [0; 3];
     for (last, curve) in last.iter_mut().zip(curves.as_chunks::<CURVE_BYTES>().0) {

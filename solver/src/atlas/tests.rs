@@ -64,7 +64,7 @@ fn lights() -> [LightEntry<'static>; 4] {
 
 /// One row of eight elements, all of code 5: a light that is not dark, and for each of the three coded planes
 /// a parameter of 15 and a first value.
-const TILES: [u8; 24] = [
+const TILES: [u8; 28] = [
     3,
     4,
     0,
@@ -77,6 +77,11 @@ const TILES: [u8; 24] = [
     0,
     0,
     0,
+    // The lights in another order.
+    2,
+    0,
+    3,
+    1,
     8,
     0,
     1,
@@ -264,9 +269,11 @@ fn what_the_format_does_not_allow_is_an_error() {
         (tiles + 4, &[2], "table of tiles"),
         (tiles + 7, &[0xff], "table of tiles"),
         (tiles + 8, &[2], "table of tiles"),
-        (tiles + 12, &[7], "table of tiles"),
-        (tiles + 14, &[0], "table of tiles"),
-        (tiles + 16, &[5], "table of tiles"),
+        (tiles + 12, &[0], "order of lights"),
+        (tiles + 15, &[4], "order of lights"),
+        (tiles + 16, &[7], "table of tiles"),
+        (tiles + 18, &[0], "table of tiles"),
+        (tiles + 20, &[5], "table of tiles"),
         (surfaces, &nan, "surface"),
         (surfaces + 48, &[5], "surface"),
         (faces, &[2], "face"),

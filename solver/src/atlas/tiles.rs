@@ -3,14 +3,20 @@
 //! Elements stand in *grids* of `width` columns, row by row; a grid is cut into tiles of `side x side`
 //! elements (fewer at its end), a grid of one row into tiles of `side^2` elements. A tile holds, light after light, what every one of its elements gets:
 //! `g`, then `r - g`, then `b - g`, of whole-number codes `r, g, b` in common steps, so that the same hue
-//! costs nothing. Each of the three is predicted from its left neighbour `a`, the upper `b`, the upper left `c` and the
+//! costs nothing.
+//!
+//! Lights that come the same way, through the same door or from the same lamps' corner, look alike down to what their bake left to chance. So
+//! lights stand in an order of their own, in which such lights follow each other, and each of the three is written as what it
+//! is more than a [`Share`] of the same of the light before: `v = g - share(g')`.
+//!
+//! Each `v` is predicted from its left neighbour `a`, the upper `b`, the upper left `c` and the
 //! upper right `d`, in one of two ways ([`Predictor`]). Where light has edges (Weinberger, Seroussi and Sapiro 2000, LOCO-I,
 //! eq. 1): `min(a, b)` if `c >= max(a, b)`, `max(a, b)` if `c <= min(a, b)`, else the plane `a + b - c`. Where it is
 //! rough: the mean `(2 a + b + d) / 4`, rounded. What is left, `e`, is written as
-//! `z = 2 e` or `-2 e - 1`: `z >> m` ones, a zero, and the lower `m` bits (Rice 1979), `m` and the predictor once per tile,
+//! `z = 2 e` or `-2 e - 1`: `z >> m` ones, a zero, and the lower `m` bits (Rice 1979), `m`, the predictor and the share once per tile,
 //! light and channel.
 //!
-//! Little-endian, lengths in bytes, `g` grids, `t` tiles (which follow from grids and side):
+//! Little-endian, lengths in bytes, `g` grids, `t` tiles (which follow from grids and side), `k` lights of the atlas:
 //!
 //! | at | what |
 //! | --- | --- |
@@ -19,12 +25,14 @@
 //! | 2 | two zero bytes |
 //! | 4 | `u32` grids `g` |
 //! | 8 | `u32` tiles `t` |
-//! | 12 | `g` grids of 4: width `u16`, height `u16`, both at least 1; together they have all elements |
+//! | 12 | `k` times `u8`: the order of the lights, every [`GROUP`] by themselves: tags less the first of the group |
+//! | | `g` grids of 4: width `u16`, height `u16`, both at least 1; together they have all elements |
 //! | | `t` times `u32`: where the bits of a tile begin, in bytes from the first |
 //! | | the bits, highest first |
 //!
-//! Bits of a tile: for every light in tiles one bit, 0 when all its codes are 0 here. Else for `g`, `r - g`, `b - g`: four
-//! bits `m`, 15 when all is as the first predictor has it, else one bit more for the predictor (1: the mean); the first value (`g` itself in its bits; of the others `z` as
+//! Bits of a tile: for every light in tiles, in their order, one bit, 0 when all its codes are 0 here. Else for `g`, `r - g`, `b - g`: four
+//! bits `m`, 15 when all is as the first predictor has it without a share, else one bit for the predictor (1: the mean) and the share (0: none, 10: half, 11: all) of the last
+//! light here that was not 0; the first value (`g` itself in its bits if it has no share; of the others `z` as
 //! ones, as many as `(z + 8) >> 3` has bits but one, a zero, and the bits of `z + 8` below its highest); then, unless `m = 15`,
 //! the others: [`ESCAPE`] ones stand before 18 bits of `z` itself. Bits past the end are 0.
 
@@ -54,6 +62,7 @@ const HEADER_BYTES: usize = 12;
 pub struct Tiles<'a> {
     side: u16,
     first_bits: u32,
+    order: &'a [u8],
     grids: &'a [u8],
     offsets: &'a [u8],
     bits: &'a [u8],
@@ -85,12 +94,15 @@ impl Place {
     }
 }
 
-/// Codes of one light in a tile, row by row: red, green, blue.
-pub type Block = [[u16; 3]; LARGEST_SIDE * LARGEST_SIDE];
+/// Lights that can change places.
+pub const GROUP: usize = 256;
+
+/// The most elements of a tile.
+const LARGEST: usize = LARGEST_SIDE * LARGEST_SIDE;
 
 impl<'a> Tiles<'a> {
-    /// Checks a table of tiles for so many elements.
-    pub(super) fn parse(bytes: &'a [u8], elements: u32) -> Result<Self, AtlasError> {
+    /// Checks a table of tiles for so many elements and lights.
+    pub(super) fn parse(bytes: &'a [u8], elements: u32, lights: u32) -> Result<Self, AtlasError> {
         let illegal = AtlasError::Illegal("table of tiles");
         let (header, rest) = bytes.split_first_chunk::<HEADER_BYTES>().ok_or(illegal)?;
         let [side, first_bits, 0, 0, g0, g1, g2, g3, t0, t1, t2, t3] = *header else {
@@ -98,17 +110,19 @@ impl<'a> Tiles<'a> {
         };
         let count = |bytes| 4 * u64::from(u32::from_le_bytes(bytes));
         let (grids, tiles) = (count([g0, g1, g2, g3]), count([t0, t1, t2, t3]));
-        if grids + tiles > rest.len() as u64
+        if u64::from(lights) + grids + tiles > rest.len() as u64
             || !(1..=LARGEST_SIDE).contains(&usize::from(side))
             || !(1..=16).contains(&first_bits)
         {
             return Err(illegal);
         }
+        let (order, rest) = rest.split_at_checked(lights as usize).ok_or(illegal)?;
         let (grids, rest) = rest.split_at_checked(grids as usize).ok_or(illegal)?;
         let (offsets, bits) = rest.split_at_checked(tiles as usize).ok_or(illegal)?;
         let tiles = Self {
             side: side.into(),
             first_bits: first_bits.into(),
+            order,
             grids,
             offsets,
             bits,
@@ -124,6 +138,9 @@ impl<'a> Tiles<'a> {
         }
         let offsets = tiles.offsets.as_chunks::<4>().0;
         let is_inside = |offset: &[u8; 4]| u32::from_le_bytes(*offset) as usize <= bits.len();
+        if !order.chunks(GROUP).all(is_permutation) {
+            return Err(AtlasError::Illegal("order of lights"));
+        }
         if held != elements.into() || count != tiles.len() as u64 || !offsets.iter().all(is_inside)
         {
             return Err(illegal);
@@ -149,6 +166,12 @@ impl<'a> Tiles<'a> {
         self.offsets.is_empty()
     }
 
+    /// Tags of all lights, of which a tile's bits have those in tiles in this order.
+    pub fn order(&self) -> impl Iterator<Item = u32> + use<'a> {
+        let groups = (0..).step_by(GROUP).zip(self.order.chunks(GROUP));
+        groups.flat_map(|(first, tags)| tags.iter().map(move |tag| first + u32::from(*tag)))
+    }
+
     /// Width and height of every grid.
     fn grids(&self) -> impl Iterator<Item = [u16; 2]> + use<'a> {
         let grids = self.grids.as_chunks::<4>().0.iter();
@@ -163,9 +186,21 @@ impl<'a> Tiles<'a> {
         let bits = offsets.map(move |offset| TileBits {
             bits: Bits::new(bits.get(offset..).unwrap_or_default()),
             first_bits,
+            coded: [[0; 3]; LARGEST],
         });
         places(self.grids(), self.side).zip(bits)
     }
+}
+
+/// Whether every number below the length is there; no more than [`GROUP`].
+fn is_permutation(order: &[u8]) -> bool {
+    let mut seen = [false; GROUP];
+    for number in order {
+        if let Some(seen) = seen.get_mut(usize::from(*number)) {
+            *seen = true;
+        }
+    }
+    seen.iter().take(order.len()).all(|seen| *seen)
 }
 
 /// Where the tiles of some grids stand, in their order.
@@ -213,6 +248,8 @@ fn sides(side: u16, height: u16) -> (NonZeroU16, NonZeroU16) {
 pub struct TileBits<'a> {
     bits: Bits<'a>,
     first_bits: u32,
+    /// `r - g`, `g`, `b - g` of the last light that was not 0, row by row; they wrap.
+    coded: [[u16; 3]; LARGEST],
 }
 
 impl TileBits<'_> {
@@ -222,73 +259,79 @@ impl TileBits<'_> {
         8 * self.bits.bytes.len() + self.bits.held as usize
     }
 
-    /// Reads the next light into the beginning of `block`; false, and nothing is written, when all
-    /// its codes are 0. Codes beyond `last` are taken as that.
-    pub fn next_light(&mut self, place: Place, last: [u16; 3], block: &mut Block) -> bool {
+    /// Reads the next light; false when all its codes are 0, else [`Self::codes`] has them.
+    pub fn next_light(&mut self, place: Place) -> bool {
         if self.bits.take(1) == 0 {
             return false;
         }
-        let columns = usize::from(place.columns);
-        let count = columns * usize::from(place.rows);
-        let block = block.get_mut(..count).unwrap_or_default();
-        let first_bits = self.first_bits;
-        // What is coded is kept in the block until all three are known; differences wrap.
+        let columns = usize::from(place.columns).max(1);
+        let coded = self.coded.get_mut(..place.len()).unwrap_or_default();
         for channel in [1, 0, 2] {
-            let parameter = self.bits.take(4);
-            let predictor = if parameter != PREDICTED && self.bits.take(1) == 1 {
-                Predictor::Mean
-            } else {
-                Predictor::Edge
-            };
-            let first = if channel == 1 {
-                self.bits.take(first_bits) as i32
-            } else {
-                unfold(self.bits.take_first())
-            };
-            let plane = Plane {
-                parameter,
-                predictor,
-                channel,
-                columns,
-            };
-            plane.decode(&mut self.bits, first, block);
-        }
-        for codes in block {
-            let [r, g, b] = codes.map(|code| i32::from(code as i16));
-            let green = i32::from(g as u16);
-            let legal = |code: i32, last: u16| code.clamp(0, last.into()) as u16;
-            let [last_r, last_g, last_b] = last;
-            *codes = [
-                legal(green + r, last_r),
-                legal(green, last_g),
-                legal(green + b, last_b),
-            ];
+            let (bits, first_bits) = (&mut self.bits, (channel == 1).then_some(self.first_bits));
+            Plane::read(bits, first_bits).decode(bits, coded, channel, columns);
         }
         true
     }
+
+    /// Red, green and blue of the light that was read last, row by row; codes beyond `last` are taken as that.
+    pub fn codes(&self, last: [u16; 3]) -> impl Iterator<Item = [u16; 3]> {
+        let [last_r, last_g, last_b] = last.map(i32::from);
+        self.coded.iter().map(move |[r, g, b]| {
+            let [r, green, b] = [signed(*r, 0), signed(*g, 1), signed(*b, 2)];
+            let legal = |code: i32, last: i32| code.clamp(0, last) as u16;
+            [
+                legal(green + r, last_r),
+                legal(green, last_g),
+                legal(green + b, last_b),
+            ]
+        })
+    }
 }
 
-/// How one of the three coded planes is written.
+/// How one of the three that are coded is written, and its first value.
 struct Plane {
     parameter: u32,
     predictor: Predictor,
-    channel: usize,
-    columns: usize,
+    share: Share,
+    first: i32,
 }
 
 impl Plane {
-    fn decode(&self, bits: &mut Bits, first: i32, block: &mut [[u16; 3]]) {
-        let columns = self.columns.max(1);
-        for at in 0..block.len() {
+    /// `first_bits` of green.
+    fn read(bits: &mut Bits, first_bits: Option<u32>) -> Self {
+        let parameter = bits.take(4);
+        let (predictor, share) = if parameter == PREDICTED {
+            (Predictor::Edge, Share::None)
+        } else {
+            (bits.take_predictor(), bits.take_share())
+        };
+        let first = match first_bits {
+            Some(count) if share == Share::None => bits.take(count) as i32,
+            _ => unfold(bits.take_first()),
+        };
+        Self {
+            parameter,
+            predictor,
+            share,
+            first,
+        }
+    }
+
+    /// Puts this light in the place of the one before.
+    fn decode(&self, bits: &mut Bits, coded: &mut [[u16; 3]], channel: usize, columns: usize) {
+        // Without the share of the light before.
+        let mut own = [0; LARGEST];
+        for (at, coded) in coded.iter_mut().enumerate() {
             let value = if at == 0 {
-                first
+                self.first
             } else {
+                let of = |at: usize| own.get(at).copied().unwrap_or(0);
                 let column = at % columns;
-                let left = (column > 0).then(|| self.read(block, at - 1));
+                let left = (column > 0).then(|| of(at - 1));
                 let above = at.checked_sub(columns).map(|above| {
                     let left = above - usize::from(column > 0);
                     let right = above + usize::from(column + 1 < columns);
-                    [left, above, right].map(|at| self.read(block, at))
+                    [left, above, right].map(of)
                 });
                 let rest = if self.parameter == PREDICTED {
                     0
@@ -297,16 +340,34 @@ impl Plane {
                 };
                 self.predictor.predict(left, above).wrapping_add(rest)
             };
-            let codes = block.get_mut(at);
-            if let Some(code) = codes.and_then(|codes| codes.get_mut(self.channel)) {
-                *code = value as u16;
+            if let (Some(own), Some(code)) = (own.get_mut(at), coded.get_mut(channel)) {
+                *own = value;
+                *code = value.wrapping_add(self.share.of(signed(*code, channel))) as u16;
             }
         }
     }
+}
 
-    fn read(&self, block: &[[u16; 3]], at: usize) -> i32 {
-        let code = block.get(at).and_then(|codes| codes.get(self.channel));
-        signed(code.copied().unwrap_or(0), self.channel)
+/// What of the light before is taken away.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Share {
+    /// Nothing.
+    None,
+    /// Half of it, rounded up.
+    Half,
+    /// All of it.
+    All,
+}
+
+impl Share {
+    /// The share of a code.
+    #[must_use]
+    pub const fn of(self, code: i32) -> i32 {
+        match self {
+            Self::None => 0,
+            Self::Half => (code + 1) >> 1,
+            Self::All => code,
+        }
     }
 }
 
@@ -345,11 +406,12 @@ impl Predictor {
                 } else if corner <= low {
                     high
                 } else {
-                    left + above - corner
+                    left.wrapping_add(above).wrapping_sub(corner)
                 }
             }
             (Some(left), Some([_, above, right]), Self::Mean) => {
-                (2 * left + above + right + 2) >> 2
+                let sum = left.wrapping_mul(2).wrapping_add(above);
+                sum.wrapping_add(right).wrapping_add(2) >> 2
             }
             (Some(only), None, _) | (None, Some([_, only, _]), _) => only,
             (None, None, _) => 0,
@@ -404,6 +466,21 @@ impl<'a> Bits<'a> {
         let value = self.buffer >> (32 - count);
         self.skip(count);
         value
+    }
+
+    fn take_predictor(&mut self) -> Predictor {
+        match self.take(1) {
+            0 => Predictor::Edge,
+            _ => Predictor::Mean,
+        }
+    }
+
+    fn take_share(&mut self) -> Share {
+        match self.take(1) {
+            0 => Share::None,
+            _ if self.take(1) == 0 => Share::Half,
+            _ => Share::All,
+        }
     }
 
     /// A difference with parameter `m`.

@@ -267,14 +267,25 @@ impl Curve {
             Self::Display { white, step } => {
                 display_code(value / white.value()) * UNITS as f32 / step as f32
             }
-            Self::Parts { white, .. } => {
-                let units = display_code(value / white.value()) * UNITS as f32;
-                let parts =
-                    (0_u8..16).take_while(|part| self.units(16 * u16::from(*part)) as f32 <= units);
-                let part = parts.last().unwrap_or(0);
-                let begin = 16 * u16::from(part);
-                let own = (self.units(begin + 1) - self.units(begin)) as f32;
-                f32::from(begin) + (units - self.units(begin) as f32) / own
+            Self::Parts {
+                white,
+                first,
+                unit,
+                steps,
+            } => {
+                let mut units = display_code(value / white.value()) * UNITS as f32;
+                units -= f32::from(first) * (UNITS / 16) as f32;
+                let places = steps.iter().flat_map(|pair| [pair & 15, pair >> 4]);
+                let mut guess = 0.0;
+                for (place, begin) in places.zip((0_u8..).step_by(PARTS)) {
+                    let step = (part_step(place) << unit.min(LARGEST_PART_UNIT)) as f32;
+                    guess = f32::from(begin) + units / step;
+                    units -= f32::from(PART_CODES) * step;
+                    if units < 0.0 {
+                        break;
+                    }
+                }
+                guess
             }
             Self::Logarithmic { .. } if value == 0.0 => return 0,
             Self::Logarithmic { first } => {
@@ -287,18 +298,16 @@ impl Curve {
         let lowest = u16::from(matches!(self, Self::Logarithmic { .. })).min(last);
         // Casts saturate.
         let guess = (math::round(guess) as u16).clamp(lowest, last);
-        let distance = |code: u16| (self.decode(code) - value).abs();
-        let neighbours = [
+        let candidates = [
+            guess,
             guess.saturating_sub(1).max(lowest),
             guess.saturating_add(1).min(last),
         ];
-        neighbours.into_iter().fold(guess, |best, code| {
-            if distance(code) < distance(best) {
-                code
-            } else {
-                best
-            }
-        })
+        let distances = candidates.map(|code| ((self.decode(code) - value).abs(), code));
+        let nearest = distances
+            .into_iter()
+            .min_by(|(a, _), (b, _)| a.total_cmp(b));
+        nearest.map_or(guess, |(_, code)| code)
     }
 
     /// How far a value between those of code 0 and `last` can lie from that of its code.

@@ -15,7 +15,7 @@
 use core::f32::consts::FRAC_1_PI;
 
 use super::{RelightError, Wide, check_lights};
-use crate::atlas::{Atlas, Block, LARGEST_SIDE, Tiles};
+use crate::atlas::{Atlas, LARGEST_SIDE, Tiles};
 use crate::code::{
     AllCodes, Code, Curve, DECODED, DECODED_BITS, ExponentialCodes, Known, Magnitude, Scale,
 };
@@ -335,15 +335,17 @@ impl<'a> FrameMix<'a> {
     #[inline(never)]
     fn brightest_of_tiles<K: Known>(&self, atlas: &Atlas, tiles: &Tiles) -> [u32; 3] {
         let mut brightest = [0; 3];
-        let mut block: Block = [[0; 3]; LARGEST_SIDE * LARGEST_SIDE];
         for (place, mut bits) in tiles.iter() {
             let mut sums = [[0; 3]; LARGEST_SIDE * LARGEST_SIDE];
-            let lights = atlas.lights().zip(self.lights.iter());
-            for (light, entry) in lights.filter(|(light, _)| light.code.is_tiled()) {
-                if bits.next_light(place, light.last, &mut block) {
-                    let terms = entry.full_terms::<K>((light.curves, light.last));
-                    for (sums, codes) in sums.iter_mut().zip(&block).take(place.len()) {
-                        add_terms::<K>(sums, &terms, *codes);
+            for light in atlas.lights_in_tiles() {
+                let found = self.lights.get(light as usize).zip(atlas.curves(light));
+                if let Some((entry, curves)) = found
+                    && bits.next_light(place)
+                {
+                    let terms = entry.full_terms::<K>(curves);
+                    for (sums, codes) in sums.iter_mut().zip(bits.codes(curves.1)).take(place.len())
+                    {
+                        add_terms::<K>(sums, &terms, codes);
                     }
                 }
             }
