@@ -11,9 +11,11 @@ mod scenes;
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput};
+use glam::Vec2;
 use relume::atlas::Atlas;
 use relume::code::Code;
 use relume::color::Rgb;
+use relume::mesh::Element;
 use relume::relight::{
     DecodeTable, FixedMix, FixedTable, FixedWeight, change_fixed, relight, relight_fixed,
     table_length,
@@ -139,10 +141,19 @@ fn atlas_bytes([width, height]: [u32; 2], lights: u32, code: Code) -> Vec<u8> {
     };
     let names = (0..lights).map(|light| (light.to_string(), Rgb::WHITE));
     let elements = 0..width * height;
-    let contributions = elements.flat_map(|e| (0..lights).map(move |light| contribution(e, light)));
-    let solution = Solution {
-        image: Some([width, height]),
-        ..Solution::from_contributions(names, contributions.collect())
+    let contributions = elements
+        .clone()
+        .flat_map(|e| (0..lights).map(move |light| contribution(e, light)));
+    let mut solution = Solution::from_contributions(names, contributions.collect());
+    solution.image = Some([width, height]);
+    // What is seen of the irradiance: the code uniform in display steps follows it.
+    let element = Element {
+        patch: 0,
+        from: Vec2::ZERO,
+        to: Vec2::ONE,
+        area: 1.0,
+        reflectance: Rgb::splat(0.5),
     };
+    solution.mesh.elements = vec![element; elements.len()];
     pack_unmeasured(&solution, code.into()).expect("an atlas that fits")
 }

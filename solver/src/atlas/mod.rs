@@ -40,6 +40,7 @@ use crate::code::Known;
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use glam::Vec2;
 
+pub(crate) use read::Group;
 pub use read::{Atlas, AtlasMesh};
 pub use tiles::{
     ESCAPE, FIRST_BITS, FULL_BITS, GROUP, LARGEST_SIDE, PREDICTED, Place, Predictor, Share,

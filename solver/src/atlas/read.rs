@@ -1,5 +1,9 @@
 //! Reads an atlas in place: everything is checked once, then access is plain slicing.
 
+use core::iter;
+use core::ops::Range;
+use core::slice::ChunksExact;
+
 use glam::{Vec2, Vec3};
 
 use super::tiles::Tiles;
@@ -284,10 +288,25 @@ impl<'a> Atlas<'a> {
         self.codes
     }
 
-    /// The codes of every element for its lights, where each is three bytes; `None` where one is not.
-    pub(crate) fn triples(&self) -> Option<impl Iterator<Item = &'a [[u8; 3]]> + use<'a>> {
-        let rows = self.codes.chunks_exact(self.stride.max(1));
-        (self.stride == 3 * self.counts.lights as usize).then(|| rows.map(|row| row.as_chunks().0))
+    /// All lights, in groups of equally many bytes of code.
+    pub(crate) fn groups(&self) -> impl Iterator<Item = Group<'a>> + use<'a> {
+        let atlas = *self;
+        let (mut light, mut start) = (0, 0);
+        iter::from_fn(move || {
+            let bytes_of = |light| code_at(atlas.lights, light).map(Code::bytes);
+            let (first, code_bytes) = (light, bytes_of(light)?);
+            while bytes_of(light) == Some(code_bytes) {
+                light += 1;
+            }
+            let from = start;
+            start += code_bytes * (light - first) as usize;
+            Some(Group {
+                code_bytes,
+                lights: first as usize..light as usize,
+                codes: atlas.codes.chunks_exact(atlas.stride.max(1)),
+                place: from..start,
+            })
+        })
     }
 
     /// Bytes of all codes, those in tiles included.
@@ -362,7 +381,11 @@ impl<'a> Atlas<'a> {
     }
 
     /// The lights in tiles; with `only`, that one by itself.
-    fn for_each_in_tiles(&self, only: Option<u32>, mut f: impl FnMut(u32, u32, [u16; 3])) {
+    pub(crate) fn for_each_in_tiles(
+        &self,
+        only: Option<u32>,
+        mut f: impl FnMut(u32, u32, [u16; 3]),
+    ) {
         let Some(tiles) = self.tiles else {
             return;
         };
@@ -394,6 +417,32 @@ impl<'a> Atlas<'a> {
     #[must_use]
     pub const fn mesh(&self) -> Option<AtlasMesh<'a>> {
         self.mesh
+    }
+}
+
+/// Lights one after the other whose codes have equally many bytes: none in tiles.
+#[derive(Debug)]
+pub(crate) struct Group<'a> {
+    /// Bytes per element and light.
+    pub code_bytes: usize,
+    lights: Range<usize>,
+    /// The codes of every element for all lights.
+    codes: ChunksExact<'a, u8>,
+    /// Where those of these lights stand.
+    place: Range<usize>,
+}
+
+impl<'a> Group<'a> {
+    /// Tags of the lights.
+    pub(crate) fn lights(&self) -> Range<usize> {
+        self.lights.clone()
+    }
+
+    /// The codes of every element for these lights.
+    pub(crate) fn rows<const N: usize>(&self) -> impl Iterator<Item = &'a [[u8; N]]> + use<'a, N> {
+        let place = self.place.clone();
+        let own = move |row: &'a [u8]| row.get(place.clone()).unwrap_or_default();
+        self.codes.clone().map(move |row| own(row).as_chunks().0)
     }
 }
 

@@ -9,6 +9,7 @@
 //! Error: half a unit for every contribution, 2^-16 of it from `W`, and for the exponential code half of 2^-13 scales
 //! from its table; [`FixedMix::error_bound`] sums them up.
 
+use super::bytes::{Sum, Values, add_group, of_colour};
 use super::{CodeTable, RelightError, check_elements, check_lights};
 use crate::atlas::Atlas;
 use crate::code::{Curve, DECODED_BITS, Scale};
@@ -67,6 +68,15 @@ impl FixedWeight {
 pub trait Terms {
     /// What a light contributes to an element that has these codes of it.
     fn terms(&self, light: u32, codes: [u16; 3]) -> [u32; 3];
+
+    /// Adds what all lights contribute to all elements.
+    fn add_all(&self, atlas: &Atlas, sums: &mut [[u32; 3]]) {
+        atlas.for_each(|element, light, codes| {
+            if let Some(sum) = sums.get_mut(element as usize) {
+                add(sum, self.terms(light, codes));
+            }
+        });
+    }
 }
 
 /// A mix in fixed point: a weight per light, and the unit of all sums.
@@ -233,6 +243,48 @@ impl Terms for FixedTable<'_> {
         let term = |channel, code| self.0.get(light, channel, code);
         [term(0, r), term(1, g), term(2, b)]
     }
+
+    fn add_all(&self, atlas: &Atlas, sums: &mut [[u32; 3]]) {
+        let tables = self.0.of_bytes();
+        for group in atlas.groups() {
+            let own = tables.get(group.lights()).unwrap_or_default();
+            add_group(&group, own.iter().map(|table| (table, ())), sums);
+        }
+        let add = |element: u32, light, codes| {
+            if let Some(sum) = sums.get_mut(element as usize) {
+                add(sum, self.terms(light, codes));
+            }
+        };
+        if tables.is_empty() {
+            atlas.for_each(add);
+        } else {
+            atlas.for_each_in_tiles(None, add);
+        }
+    }
+}
+
+impl Sum for [u32; 3] {
+    type Value = u32;
+    type Weight = ();
+
+    fn to_lanes(self) -> [u32; 4] {
+        let [r, g, b] = self;
+        [r, g, b, 0]
+    }
+
+    fn from_lanes([r, g, b, _]: [u32; 4]) -> Self {
+        [r, g, b]
+    }
+
+    /// Each channel has its own weight multiplied in.
+    fn of_luminance(terms: &Values<u32>, code: u8) -> [u32; 4] {
+        of_colour(terms, [code; 3])
+    }
+
+    fn add(mut sum: [u32; 4], (): (), terms: [u32; 4]) -> [u32; 4] {
+        add(&mut sum, terms);
+        sum
+    }
 }
 
 /// Sums of every element, in units of [`FixedMix::unit`].
@@ -246,11 +298,7 @@ pub fn relight_fixed(
 ) -> Result<(), RelightError> {
     check_elements(atlas, sums.len())?;
     sums.fill([0; 3]);
-    atlas.for_each(|element, light, codes| {
-        if let Some(sum) = sums.get_mut(element as usize) {
-            add(sum, terms.terms(light, codes));
-        }
-    });
+    terms.add_all(atlas, sums);
     Ok(())
 }
 
@@ -284,7 +332,7 @@ pub fn change_fixed(
     Ok(())
 }
 
-fn add(sum: &mut [u32; 3], terms: [u32; 3]) {
+fn add<const N: usize>(sum: &mut [u32; N], terms: [u32; N]) {
     for (sum, term) in sum.iter_mut().zip(terms) {
         *sum = sum.wrapping_add(term);
     }

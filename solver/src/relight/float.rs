@@ -1,5 +1,6 @@
 //! The sum in `f32`.
 
+use super::bytes::{Sum, Values, add_group, of};
 use super::{CodeTable, RelightError, check_elements, check_mix};
 use crate::atlas::Atlas;
 use crate::color::Rgb;
@@ -45,34 +46,49 @@ pub fn relight(
 ) -> Result<(), RelightError> {
     check_mix(atlas, mix)?;
     check_elements(atlas, irradiance.len())?;
-    let tables = table.0.of_bytes();
-    if let Some(rows) = atlas.triples().filter(|_| tables.len() == mix.len()) {
-        for (sum, row) in irradiance.iter_mut().zip(rows) {
-            *sum = mixed(row, tables, mix);
-        }
-        return Ok(());
-    }
     irradiance.fill(Rgb::BLACK);
-    atlas.for_each(|element, light, codes| {
+    let tables = table.0.of_bytes();
+    for group in atlas.groups() {
+        let own = tables.get(group.lights()).zip(mix.get(group.lights()));
+        let (tables, mix) = own.unwrap_or_default();
+        add_group(&group, tables.iter().zip(mix.iter().copied()), irradiance);
+    }
+    let add = |element: u32, light: u32, codes| {
         let sum = irradiance.get_mut(element as usize);
         if let (Some(sum), Some(weight)) = (sum, mix.get(light as usize)) {
             *sum += *weight * table.decode(light, codes);
         }
-    });
+    };
+    if tables.is_empty() {
+        atlas.for_each(add);
+    } else {
+        atlas.for_each_in_tiles(None, add);
+    }
     Ok(())
 }
 
-/// An element under a mix, all of whose lights have codes of three bytes: no look-up can fail, which is four times as fast.
-fn mixed(row: &[[u8; 3]], tables: &[[[f32; 256]; 3]], mix: &[Rgb]) -> Rgb {
-    let mut sum = Rgb::BLACK;
-    for (([r, g, b], tables), weight) in row.iter().zip(tables).zip(mix) {
-        let [reds, greens, blues] = tables;
-        let value = |table: &[f32; 256], code: u8| {
-            // A byte is below 256.
-            #[allow(clippy::indexing_slicing)]
-            table[usize::from(code)]
-        };
-        sum += *weight * Rgb::new(value(reds, *r), value(greens, *g), value(blues, *b));
+impl Sum for Rgb {
+    type Value = f32;
+    type Weight = Self;
+
+    fn to_lanes(self) -> [f32; 4] {
+        [self.r, self.g, self.b, 0.0]
     }
-    sum
+
+    fn from_lanes([r, g, b, _]: [f32; 4]) -> Self {
+        Self::new(r, g, b)
+    }
+
+    fn of_luminance([values, ..]: &Values<f32>, code: u8) -> [f32; 4] {
+        let value = of(values, code);
+        [value, value, value, 0.0]
+    }
+
+    fn add(mut sum: [f32; 4], weight: Self, values: [f32; 4]) -> [f32; 4] {
+        let weights = weight.to_lanes();
+        for ((sum, weight), value) in sum.iter_mut().zip(weights).zip(values) {
+            *sum += weight * value;
+        }
+        sum
+    }
 }

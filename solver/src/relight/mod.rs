@@ -3,7 +3,7 @@
 //! `E_j = sum_m w_m x_m(c_jm)`, channel by channel, with the decoded value `x_m` of a code
 //! ([`Curve`](crate::code::Curve)) and the weight `w_m`, the mix. Three kernels over the same codes:
 //!
-//! * [`relight`] in `f32`, for a host;
+//! * [`relight`] in `f32`, for a host, in vectors where codes are bytes;
 //! * [`relight_fixed`] in integers, for any device: every contribution is rounded to a whole number of a common unit
 //!   and `u32` sums are exact, so that a change ([`change_fixed`]) gives the bits of a full
 //!   relight, and a change and its undoing restore the same bits. Terms come from a table of all products
@@ -12,6 +12,7 @@
 //!   [`Curve`](crate::code::Curve) proves for the logarithmic code.
 
 mod by_light;
+mod bytes;
 mod fitted;
 mod fixed;
 mod float;
@@ -21,6 +22,7 @@ mod wide;
 
 use core::fmt;
 
+use self::bytes::Values;
 use crate::atlas::Atlas;
 use crate::color::Rgb;
 
@@ -119,7 +121,7 @@ impl<'a, T: Copy + Default> CodeTable<'a, T> {
     }
 
     /// The same values where every code is a byte: `[light][channel][code]`; nothing where not.
-    fn of_bytes(&self) -> &[[[T; 256]; 3]] {
+    fn of_bytes(&self) -> &[Values<T>] {
         if self.levels == 256 {
             self.values.as_chunks().0.as_chunks().0
         } else {
@@ -160,6 +162,9 @@ fn check_elements(atlas: &Atlas, found: usize) -> Result<(), RelightError> {
         Err(RelightError::Elements { expected })
     }
 }
+
+#[cfg(test)]
+mod test_atlas;
 
 #[cfg(test)]
 mod tests;

@@ -1,7 +1,7 @@
 extern crate std;
 use super::*;
-use crate::atlas::{AtlasError, Contents, LightEntry, Quantity, size, write};
-use crate::code::{Code, Curve, Scale};
+use crate::atlas::AtlasError;
+use crate::code::Code;
 use crate::tone::{Exposure, Rgb565Table, Rgb888Table, radiance};
 use proptest::prelude::*;
 use std::format;
@@ -20,32 +20,7 @@ fn contribution(element: u32, light: u32) -> Rgb {
 }
 
 fn atlas_bytes(code: Code) -> Vec<u8> {
-    let entry = |light: u32| {
-        let values = (0..ELEMENTS).map(|e| contribution(e, light).max_channel());
-        let largest = values.fold(0.0, f32::max);
-        let scale = Scale::fitting(largest).unwrap();
-        let entry = LightEntry::exponential("", Rgb::WHITE, code, scale);
-        match code {
-            Code::Display8 => LightEntry {
-                curves: [Curve::display_between(scale, 0.0, largest).unwrap(); 3],
-                ..entry
-            },
-            _ => entry,
-        }
-    };
-    let entries: Vec<LightEntry> = (0..LIGHTS as u32).map(entry).collect();
-    let contents = Contents {
-        quantity: Quantity::Irradiance,
-        lights: &entries,
-        elements: ELEMENTS,
-        image_width: 0,
-        errors: None,
-        tiles: &[],
-        mesh: None,
-    };
-    let mut bytes = vec![0; size(&contents).unwrap()];
-    write(&contents, contribution, &mut bytes).unwrap();
-    bytes
+    test_atlas::atlas_bytes(&[code; LIGHTS], ELEMENTS, contribution)
 }
 
 const RUNS: [Run; 4] = [

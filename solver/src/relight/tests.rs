@@ -1,12 +1,12 @@
 extern crate std;
 use super::*;
-use crate::atlas::{Contents, LightEntry, Quantity, size, write};
-use crate::code::{Code, Curve, Scale};
+use crate::code::Code;
 use proptest::prelude::*;
 use std::vec;
 use std::vec::Vec;
 
-const ELEMENTS: u32 = 40;
+/// No multiple of the elements that are summed together.
+const ELEMENTS: u32 = 42;
 
 fn power(light: u32) -> f32 {
     10.0_f32.powi(light as i32 % 4 - 2)
@@ -18,39 +18,12 @@ fn contribution(element: u32, light: u32) -> Rgb {
 }
 
 /// Lights of all codes that need no tiles, in turn.
-fn atlas_bytes(lights: u32) -> Vec<u8> {
-    let entry = |light: u32| {
-        let largest = 2.0 * power(light);
-        let exponential =
-            |code| LightEntry::exponential("", Rgb::WHITE, code, Scale::fitting(largest).unwrap());
-        match light % 3 {
-            0 => exponential(Code::Exp8s),
-            1 => LightEntry {
-                code: Code::Display8,
-                curves: [Curve::display_between(
-                    Scale::at_least(power(light)).unwrap(),
-                    0.0,
-                    largest,
-                )
-                .unwrap(); 3],
-                ..exponential(Code::Exp8s)
-            },
-            _ => exponential(Code::Lum8),
-        }
-    };
-    let entries: Vec<LightEntry> = (0..lights).map(entry).collect();
-    let contents = Contents {
-        quantity: Quantity::Irradiance,
-        lights: &entries,
-        elements: ELEMENTS,
-        image_width: 0,
-        errors: None,
-        tiles: &[],
-        mesh: None,
-    };
-    let mut bytes = vec![0; size(&contents).unwrap()];
-    write(&contents, contribution, &mut bytes).unwrap();
-    bytes
+fn atlas_bytes(lights: usize) -> Vec<u8> {
+    let codes = [Code::Exp8s, Code::Display8, Code::Lum8]
+        .into_iter()
+        .cycle();
+    let codes: Vec<Code> = codes.take(lights).collect();
+    test_atlas::atlas_bytes(&codes, ELEMENTS, contribution)
 }
 
 fn mix_strategy(lights: usize) -> impl Strategy<Value = Vec<Rgb>> {
@@ -94,6 +67,21 @@ proptest! {
                 let error = (found - f64::from(exact)).abs();
                 prop_assert!(error <= f64::from(fixed.error_bound()), "{} {} {}", found, exact, fixed.error_bound());
             }
+        }
+    }
+
+    #[test]
+    fn float_sums_have_the_bits_of_one_light_after_the_other(mix in mix_strategy(9)) {
+        let alike = |code| test_atlas::atlas_bytes(&[code; 9], ELEMENTS, contribution);
+        for bytes in [atlas_bytes(9), alike(Code::Display8), alike(Code::Lum8)] {
+            let atlas = Atlas::parse(&bytes).unwrap();
+            let mut values = vec![0.0; table_length(&atlas)];
+            let table = DecodeTable::new(&atlas, &mut values).unwrap();
+            let mut one_by_one = vec![Rgb::BLACK; ELEMENTS as usize];
+            atlas.for_each(|element, light, codes| {
+                one_by_one[element as usize] += mix[light as usize] * table.decode(light, codes);
+            });
+            prop_assert_eq!(in_floats(&atlas, &mix), one_by_one);
         }
     }
 
@@ -167,7 +155,7 @@ fn slices_and_weights_that_do_not_fit_are_refused() {
     let bad = [Rgb::WHITE, Rgb::splat(f32::NAN)];
     let refused = Err(RelightError::Mix { light: 1 });
     assert_eq!(relight(&atlas, &table, &bad, &mut irradiance), refused);
-    let elements = Err(RelightError::Elements { expected: 40 });
+    let elements = Err(RelightError::Elements { expected: ELEMENTS });
     assert_eq!(
         relight(&atlas, &table, &mix, &mut irradiance[..3]),
         elements
