@@ -111,14 +111,17 @@ impl Rgb565Table {
 impl Encode for Rgb565Table {
     type Pixel = u16;
 
+    const BITS: [u32; 3] = [10, 11, 10];
+
     fn white(&self) -> u16 {
         self.white
     }
 
     #[inline(always)]
     fn encode(&self, [r, g, b]: [u32; 3]) -> u16 {
-        let (r, b) = (step_of(&self.five, r / 2), step_of(&self.five, b / 2));
-        b | step_of(&self.six, g) << 5 | r << 11
+        let g = step_of(&self.six, g) << 5;
+        let r = step_of(&self.five, r) << 11;
+        (g + r) + step_of(&self.five, b)
     }
 }
 
@@ -143,6 +146,8 @@ impl Rgb888Table {
 impl Encode for Rgb888Table {
     type Pixel = [u8; 3];
 
+    const BITS: [u32; 3] = [11; 3];
+
     fn white(&self) -> u16 {
         self.white
     }
@@ -155,7 +160,7 @@ impl Encode for Rgb888Table {
 
 #[inline(always)]
 fn step_of<const N: usize>(table: &[u8; N], step: u32) -> u16 {
-    // Not reached by the kernels, whose steps have 11 bits.
+    // Not reached by the kernels, whose steps have no more bits than they should.
     u16::from(table.get(step as usize).copied().unwrap_or(u8::MAX))
 }
 

@@ -9,8 +9,8 @@ use relume::atlas::{Atlas, Quantity};
 use relume::code::Code;
 use relume::color::Rgb;
 use relume::relight::{
-    AnyTable, Colour, DecodeTable, Finish, Form, FrameLight, FrameMix, Lum, Run, fill_table, full,
-    full_any, relight, table_length,
+    AnyTable, Colour, DecodeTable, Finish, Fitted, Form, FrameLight, FrameMix, Lum, Run,
+    fill_table, full, full_any, relight, table_length,
 };
 use relume::tone::{Exposure, Rgb565Table, radiance};
 use relume_host::bake::{Method, Settings, bake};
@@ -264,6 +264,20 @@ impl Input {
         let _ = writeln!(text, "    ],\n    exposure: {:?},\n}};", self.exposure);
         write_if_new(&path, &self.atlas);
         write_if_new(&path.with_extension("rs"), text.as_bytes());
+        if let Ok(full) = <&[Rgb; 8]>::try_from(self.full.as_slice())
+            && self.name.starts_with("lum")
+        {
+            let fitted = Fitted::new(&atlas, full, &self.runs, self.exposure, &TONE);
+            let fitted = fitted.expect("the exposure is not that far from white");
+            let Self { levels, runs, .. } = self;
+            let text = format!(
+                "use firmware::kernels::FittedInput;\nuse relume::relight::{{Fitted, Run}};\n\n\
+                 static INPUT: FittedInput<{lights}> = FittedInput {{\n    atlas: include_bytes!({path:?}),\n    \
+                 fitted: {fitted:?},\n    levels: {levels:?},\n    runs: &{runs:?},\n}};\n"
+            );
+            let path = folder.join(format!("{}_fitted.rs", self.name));
+            write_if_new(&path, text.as_bytes());
+        }
     }
 }
 

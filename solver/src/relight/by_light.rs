@@ -6,7 +6,7 @@
 use core::num::NonZeroUsize;
 
 use super::frame::{Encode, Finish, FrameMix};
-use super::packed::{Form, fill_change, fill_table};
+use super::packed::{Factors, Form, HAS_WIDE, check_pixels, fill_change, fill_table};
 use super::{RelightError, check_elements};
 use crate::atlas::Atlas;
 
@@ -76,11 +76,13 @@ pub fn show_sums<F: Form, T: Encode>(
     pixels: &mut [T::Pixel],
 ) -> Result<(), RelightError> {
     check_elements(atlas, sums.len())?;
-    let mut sums = sums;
-    finish.by_run(pixels, |pixels, factors| {
-        let own = sums.split_off(..pixels.len()).unwrap_or_default();
-        for (sum, pixel) in own.iter().zip(pixels) {
-            *pixel = finish.tone.encode(F::steps(*sum, factors));
+    check_pixels(sums.len(), pixels.len())?;
+    let mut pixels = pixels;
+    finish.by_run(sums, |sums, factors| {
+        let factors = Factors::new::<F>(factors);
+        let own = pixels.split_off_mut(..sums.len()).unwrap_or_default();
+        for (sum, pixel) in sums.iter().zip(own) {
+            *pixel = finish.tone.encode(factors.steps::<F, T, HAS_WIDE>(*sum));
         }
     })
 }

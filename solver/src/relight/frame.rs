@@ -41,10 +41,13 @@ pub trait Encode {
     /// What a display takes.
     type Pixel: Copy;
 
-    /// The step at which white begins.
+    /// Bits of the linear steps that red, green and blue are told apart by: 11 for all [`STEPS`], 10 for every second one.
+    const BITS: [u32; 3];
+
+    /// The step of [`STEPS`] at which white begins.
     fn white(&self) -> u16;
 
-    /// The pixel of linear steps below [`STEPS`]; larger ones are taken as the last.
+    /// The pixel of linear steps of so many bits; larger ones are taken as the last.
     fn encode(&self, steps: [u32; 3]) -> Self::Pixel;
 }
 
@@ -60,6 +63,14 @@ impl Gain {
         mantissa: 0,
         exponent: 0,
     };
+
+    pub(super) const fn parts(self) -> (u16, i16) {
+        (self.mantissa, self.exponent)
+    }
+
+    pub(super) const fn from_parts((mantissa, exponent): (u16, i16)) -> Self {
+        Self { mantissa, exponent }
+    }
 
     fn new(value: Wide) -> Self {
         let Magnitude { mantissa, exponent } = value.magnitude();
@@ -180,10 +191,19 @@ pub struct FrameLight {
 
 impl FrameLight {
     /// A light that gives nothing: room for [`FrameMix::new`].
-    pub const EMPTY: Self = Self {
-        gains: [Gain::ZERO; 3],
-        levels: [0; 3],
-    };
+    pub const EMPTY: Self = Self::new([Gain::ZERO; 3]);
+
+    /// A light that is off.
+    pub(super) const fn new(gains: [Gain; 3]) -> Self {
+        Self {
+            gains,
+            levels: [0; 3],
+        }
+    }
+
+    pub(super) const fn gains(&self) -> [Gain; 3] {
+        self.gains
+    }
 }
 
 /// A mix in levels.
@@ -237,10 +257,7 @@ impl<'a> FrameMix<'a> {
         if full.len() > 1000 {
             return Err(RelightError::Range);
         }
-        let mut mix = Self {
-            lights,
-            full_scale: [Wide::ZERO; 3],
-        };
+        let mut mix = Self::of_lights(lights);
         mix.for_units::<K>(atlas, full, |_, scale, unit, largest| {
             *scale = scale.plus(unit.times(largest));
         });
@@ -256,6 +273,14 @@ impl<'a> FrameMix<'a> {
         }
         mix.fill_gains::<K>(atlas, full);
         Ok(mix)
+    }
+
+    /// Without a full scale.
+    pub(super) const fn of_lights(lights: &'a mut [FrameLight]) -> Self {
+        Self {
+            lights,
+            full_scale: [Wide::ZERO; 3],
+        }
     }
 
     /// Gains at the present full scale; levels become 0.
@@ -365,7 +390,7 @@ impl<'a> FrameMix<'a> {
 
     /// The gains of [`Finish`]; `None` where its error is [`RelightError::Range`].
     #[inline(never)]
-    fn shown(&self, runs: &[Run], exposure: f32, white: u16) -> Option<[Shown; 3]> {
+    pub(super) fn shown(&self, runs: &[Run], exposure: f32, white: u16) -> Option<[Gain; 3]> {
         let is_positive = (1..0x7f80_0000).contains(&exposure.to_bits());
         let white = Wide::new(white.into(), -(STEPS.ilog2() as i32));
         let shown = Wide::from_float(exposure).times(Wide::from_float(FRAC_1_PI));
@@ -375,7 +400,7 @@ impl<'a> FrameMix<'a> {
             let mut channels = gains.iter().zip(run.reflectance);
             channels.all(|(gain, reflectance)| gain.fits(reflectance))
         };
-        (is_positive && runs.iter().all(fits)).then(|| gains.map(Shown::new))
+        (is_positive && runs.iter().all(fits)).then_some(gains)
     }
 
     /// Sets the levels of a light: shares of its full weight, 2^-16 each; without such a light nothing happens.
@@ -391,40 +416,55 @@ impl<'a> FrameMix<'a> {
         Some(self.lights.get(light as usize)?.levels)
     }
 
-    /// What the codes of a light contribute to sums of so many bits.
-    pub(super) fn terms<K: Known>(
-        &self,
-        atlas: &Atlas,
-        light: u32,
-        bits: [u32; 3],
-    ) -> Result<Terms, RelightError> {
-        let expected = atlas.light_count();
+    /// What multiplies the values of a light's codes, for sums of so many bits.
+    pub(super) fn weights(&self, light: u32, bits: [u32; 3]) -> Result<[Weight; 3], RelightError> {
+        let expected = self.lights.len() as u32;
         let entry = self.lights.get(light as usize);
-        let found = entry.zip(atlas.curves(light));
-        let (entry, (curves, last)) = found.ok_or(RelightError::Lights { expected })?;
-        Ok(with_values::<K>(entry.weights(bits), curves, last))
+        let entry = entry.ok_or(RelightError::Lights { expected })?;
+        Ok(entry.weights(bits))
+    }
+
+    /// The same at other levels.
+    pub(super) fn weights_at(
+        &self,
+        light: u32,
+        levels: [u16; 3],
+        bits: [u32; 3],
+    ) -> Result<[Weight; 3], RelightError> {
+        let expected = self.lights.len() as u32;
+        let entry = self.lights.get(light as usize).copied();
+        let entry = entry.ok_or(RelightError::Lights { expected })?;
+        Ok(FrameLight { levels, ..entry }.weights(bits))
     }
 }
 
-/// What the codes of a light contribute, by channel.
-pub type Terms = [(Weight, Values); 3];
+/// The values of a light's codes, by channel.
+pub(super) fn values<K: Known>(atlas: &Atlas, light: u32) -> Result<[Values; 3], RelightError> {
+    let expected = atlas.light_count();
+    let curves = atlas.curves(light);
+    Ok(values_of::<K>(
+        curves.ok_or(RelightError::Lights { expected })?,
+    ))
+}
 
-fn with_values<K: Known>(weights: [Weight; 3], curves: [Curve; 3], last: [u16; 3]) -> Terms {
-    let ([r, g, b], [curve_r, curve_g, curve_b]) = (weights, curves);
-    let [last_r, last_g, last_b] = last;
+fn values_of<K: Known>((curves, last): ([Curve; 3], [u16; 3])) -> [Values; 3] {
+    let ([r, g, b], [last_r, last_g, last_b]) = (curves, last);
     [
-        (r, Values::new::<K>(curve_r, last_r)),
-        (g, Values::new::<K>(curve_g, last_g)),
-        (b, Values::new::<K>(curve_b, last_b)),
+        Values::new::<K>(r, last_r),
+        Values::new::<K>(g, last_g),
+        Values::new::<K>(b, last_b),
     ]
 }
+
+/// What the codes of a light contribute.
+type Terms = ([Weight; 3], [Values; 3]);
 
 impl FrameLight {
     /// What multiplies the values of the codes.
     #[inline(never)]
     fn weights(&self, bits: [u32; 3]) -> [Weight; 3] {
         let mut weights = [Weight::ZERO; 3];
-        let channels = weights.iter_mut().zip(self.gains);
+        let channels = weights.iter_mut().zip(&self.gains);
         for ((weight, gain), (level, bits)) in channels.zip(self.levels.iter().zip(bits)) {
             *weight = gain.weight(*level, bits);
         }
@@ -432,17 +472,18 @@ impl FrameLight {
     }
 
     /// At the full weight, in 2^-16 of the full scale.
-    fn full_terms<K: Known>(&self, (curves, last): ([Curve; 3], [u16; 3])) -> Terms {
+    fn full_terms<K: Known>(&self, curves: ([Curve; 3], [u16; 3])) -> Terms {
         let full = Self {
             levels: [u16::MAX; 3],
             ..*self
         };
-        with_values::<K>(full.weights([BITS as u32; 3]), curves, last)
+        (full.weights([BITS as u32; 3]), values_of::<K>(curves))
     }
 }
 
 /// Adds what the codes of a light contribute.
-fn add_terms<K: Known>(sums: &mut [u32; 3], terms: &Terms, codes: [impl Into<u16>; 3]) {
+fn add_terms<K: Known>(sums: &mut [u32; 3], (weights, values): &Terms, codes: [impl Into<u16>; 3]) {
+    let terms = weights.iter().zip(values);
     for ((sum, (weight, values)), code) in sums.iter_mut().zip(terms).zip(codes) {
         *sum += weight.of(values.of::<K>(code.into()));
     }
@@ -496,20 +537,28 @@ impl<'a, T: Encode> Finish<'a, T> {
         exposure: f32,
         tone: &'a T,
     ) -> Result<Self, RelightError> {
+        let gains = mix.shown(runs, exposure, tone.white());
+        Self::with_gains(atlas, runs, gains.ok_or(RelightError::Range)?, tone)
+    }
+
+    pub(super) fn with_gains(
+        atlas: &Atlas,
+        runs: &'a [Run],
+        gains: [Gain; 3],
+        tone: &'a T,
+    ) -> Result<Self, RelightError> {
         let elements = atlas.element_count() as usize;
         check_runs(runs, elements)?;
-        let gains = mix.shown(runs, exposure, tone.white());
-        let gains = gains.ok_or(RelightError::Range)?;
         Ok(Self {
             runs,
             elements,
-            gains,
+            gains: gains.map(Shown::new),
             tone,
         })
     }
 
     /// Whether there are so many elements.
-    pub(super) fn check(&self, elements: usize) -> Result<(), RelightError> {
+    fn check(&self, elements: usize) -> Result<(), RelightError> {
         let expected = self.elements as u32;
         if elements == self.elements {
             Ok(())
@@ -518,16 +567,16 @@ impl<'a, T: Encode> Finish<'a, T> {
         }
     }
 
-    /// Calls `f` with the pixels of every run and what multiplies their sums.
+    /// Calls `f` with what belongs to the elements of every run, and what multiplies their sums.
     #[inline(always)]
-    pub(super) fn by_run(
+    pub(super) fn by_run<E>(
         &self,
-        mut pixels: &mut [T::Pixel],
-        mut f: impl FnMut(&mut [T::Pixel], [u16; 3]),
+        mut of_elements: &[E],
+        mut f: impl FnMut(&[E], [u16; 3]),
     ) -> Result<(), RelightError> {
-        self.check(pixels.len())?;
+        self.check(of_elements.len())?;
         for run in self.runs {
-            let own = pixels.split_off_mut(..run.elements as usize);
+            let own = of_elements.split_off(..run.elements as usize);
             let ([r, g, b], [gain_r, gain_g, gain_b]) = (run.reflectance, self.gains);
             let factors = [gain_r.factor(r), gain_g.factor(g), gain_b.factor(b)];
             f(own.unwrap_or_default(), factors);

@@ -13,6 +13,7 @@
 
 mod by_light;
 mod bytes;
+mod fitted;
 mod fixed;
 mod float;
 mod frame;
@@ -26,6 +27,7 @@ use crate::atlas::Atlas;
 use crate::color::Rgb;
 
 pub use by_light::{add_lights, change_light, show_sums};
+pub use fitted::Fitted;
 pub use fixed::{FixedMix, FixedTable, FixedWeight, Terms, change_fixed, relight_fixed};
 pub use float::{DecodeTable, relight};
 pub use frame::{Encode, Finish, FrameLight, FrameMix, Run, STEPS};

@@ -8,17 +8,20 @@
 //! * [`Colour`]: a table of 256 for each channel, in 16 bits.
 //!
 //! [`full`] adds up `K` tables; [`Sums`] keeps what was added, for lights that change one at a time or
-//! whose tables do not fit into memory together. Sums wrap, so undoing a change restores the same bits.
+//! whose tables do not fit into memory together, and sends a display whole frames or strips of them. Sums wrap, so undoing a change restores the same bits.
 //! `K` is a constant because it halves the instructions. Any mixture of codes, tiles above all, goes through [`full_any`],
 //! which decodes first.
 
 use core::array;
+use core::cell::Cell;
+use core::fmt;
 use core::hint::black_box;
+use core::mem;
 
-use super::frame::{Encode, Finish, FrameLight, FrameMix, Terms, Weight};
+use super::frame::{Encode, Finish, FrameLight, FrameMix, Weight, values};
 use super::{CodeTable, RelightError, check_elements};
 use crate::atlas::{Atlas, AtlasError};
-use crate::code::{AllCodes, Code, ExponentialCodes, Known};
+use crate::code::{AllCodes, Code, DECODED, ExponentialCodes, Known};
 use crate::color::Rgb;
 
 /// Bits of red, green and blue in a packed word, red at the top.
@@ -31,22 +34,22 @@ const SINGLE: u32 = 16;
 /// loops are cut in another way; what they compute is the same.
 const IS_SMALL: bool = !cfg!(target_has_atomic = "32");
 
+/// Whether a core multiplies two words into two in one instruction.
+pub(super) const HAS_WIDE: bool = !IS_SMALL;
+
 /// Elements that look for a table together.
 const GROUP: usize = if IS_SMALL { 1 } else { 2 };
-
-/// Sums that are shown together.
-const SHOWN: usize = if IS_SMALL { 2 } else { 4 };
 
 /// How the codes of an element are stored, and their contributions summed.
 pub trait Form {
     /// The codes that an atlas in this form may be in.
     type Known: Known;
     /// What all lights of the atlas are written in has so many bytes.
-    type Codes: Copy;
+    type Codes: Copy + fmt::Debug;
     /// The contribution of a light, or a sum of them.
-    type Sum: Copy + Default;
+    type Sum: Copy + Default + fmt::Debug;
     /// What every code contributes of a light.
-    type Table;
+    type Table: fmt::Debug;
 
     /// Bits of a sum.
     const BITS: [u32; 3];
@@ -72,16 +75,28 @@ pub trait Form {
     /// The codes of all elements, whose lights stand next to each other; `None` for lights in another form.
     fn codes<'a>(atlas: &Atlas<'a>) -> Option<&'a [Self::Codes]>;
 
-    /// Puts what a weight makes of every code into a table; of a change, minus what it made before.
-    fn fill(table: &mut Self::Table, before: Option<&Terms>, after: &Terms);
+    /// Puts what weights make of every code of a light into a table, minus what other weights made of it before.
+    ///
+    /// # Errors
+    /// [`RelightError::Lights`] without such a light.
+    fn fill(
+        table: &mut Self::Table,
+        atlas: &Atlas,
+        light: u32,
+        before: Option<[Weight; 3]>,
+        after: [Weight; 3],
+    ) -> Result<(), RelightError>;
 
     /// A sum, and what a table says of a light's codes.
     #[must_use]
     fn add(sum: Self::Sum, table: &Self::Table, codes: &Self::Codes) -> Self::Sum;
 
+    /// Bits of the fields of a sum that are shown.
+    const SHOWN: [u32; 3];
+
     /// What is shown of a sum.
     #[must_use]
-    fn steps(sum: Self::Sum, factors: [u16; 3]) -> [u32; 3];
+    fn fields(sum: Self::Sum) -> [u32; 3];
 }
 
 /// All lights in [`Code::Lum8`].
@@ -95,6 +110,7 @@ impl Form for Lum {
     type Table = [u32; 256];
 
     const BITS: [u32; 3] = PACKED;
+    const SHOWN: [u32; 3] = [10, 16, 10];
     const EMPTY: [u32; 256] = [0; 256];
 
     fn parse(bytes: &[u8]) -> Result<Atlas<'_>, AtlasError> {
@@ -114,13 +130,20 @@ impl Form for Lum {
         fits.then_some(atlas.codes())
     }
 
-    fn fill(table: &mut [u32; 256], before: Option<&Terms>, after: &Terms) {
+    fn fill(
+        table: &mut [u32; 256],
+        _: &Atlas,
+        _: u32,
+        before: Option<[Weight; 3]>,
+        after: [Weight; 3],
+    ) -> Result<(), RelightError> {
         if let Some(before) = before {
-            fill_packed(table, before, 0);
-            fill_packed(table, after, u32::MAX);
+            fill_packed(table, &before, 0);
+            fill_packed(table, &after, u32::MAX);
         } else {
-            fill_packed(table, after, 0);
+            fill_packed(table, &after, 0);
         }
+        Ok(())
     }
 
     #[inline(always)]
@@ -129,30 +152,21 @@ impl Form for Lum {
     }
 
     #[inline(always)]
-    fn steps(sum: u32, factors: [u16; 3]) -> [u32; 3] {
-        let [r, g, b] = factors.map(u32::from);
-        // Small cores take 16 bits out in two instructions, other numbers of bits in four: green has a piece of blue behind it.
-        let blue = if IS_SMALL {
-            ((sum << 6 & 0xffff) * b) >> 21
-        } else {
-            ((sum & 0x3ff) * b) >> 15
-        };
-        // Steps of 11 bits.
-        [
-            ((sum >> 22) * r) >> 15,
-            ((sum >> 6 & 0xffff) * g) >> 21,
-            blue,
-        ]
+    fn fields(sum: u32) -> [u32; 3] {
+        // Small cores take 16 bits out in two instructions, 12 in four: green has a piece of blue behind it.
+        [sum >> 22, sum >> 6 & 0xffff, sum & 0x3ff]
     }
 }
 
-/// Puts what a weight makes of every code into a table, minus what is `kept` of it.
+/// Puts what weights make of every code into a table, minus what is `kept` of it.
 #[inline(never)]
-fn fill_packed(table: &mut [u32; 256], [(r, values), (g, _), (b, _)]: &Terms, kept: u32) {
-    values.with_codes::<ExponentialCodes, _>(table.iter_mut(), |entry, value| {
+fn fill_packed(table: &mut [u32; 256], [r, g, b]: &[Weight; 3], kept: u32) {
+    for (entry, value) in table.iter_mut().zip(&DECODED) {
+        let value = u32::from(*value);
         let packed = r.of(value) << 22 | g.of(value) << 10 | b.of(value);
         *entry = packed.wrapping_sub(*entry & kept);
-    });
+        as_it_is();
+    }
 }
 
 /// All lights in codes of three bytes.
@@ -166,6 +180,7 @@ impl Form for Colour {
     type Table = [[u16; 256]; 3];
 
     const BITS: [u32; 3] = [SINGLE; 3];
+    const SHOWN: [u32; 3] = [SINGLE; 3];
     const EMPTY: [[u16; 256]; 3] = [[0; 256]; 3];
 
     fn parse(bytes: &[u8]) -> Result<Atlas<'_>, AtlasError> {
@@ -186,13 +201,21 @@ impl Form for Colour {
     }
 
     #[inline(never)]
-    fn fill(tables: &mut [[u16; 256]; 3], before: Option<&Terms>, after: &Terms) {
-        let old = before.map_or([Weight::ZERO; 3], |terms| terms.map(|(weight, _)| weight));
-        for ((table, (weight, values)), old) in tables.iter_mut().zip(after).zip(old) {
+    fn fill(
+        tables: &mut [[u16; 256]; 3],
+        atlas: &Atlas,
+        light: u32,
+        before: Option<[Weight; 3]>,
+        after: [Weight; 3],
+    ) -> Result<(), RelightError> {
+        let values = values::<Self::Known>(atlas, light)?;
+        let weights = before.unwrap_or([Weight::ZERO; 3]).into_iter().zip(after);
+        for ((table, values), (before, after)) in tables.iter_mut().zip(&values).zip(weights) {
             values.with_codes::<Self::Known, _>(table.iter_mut(), |entry, value| {
-                *entry = weight.of(value).wrapping_sub(old.of(value)) as u16;
+                *entry = after.of(value).wrapping_sub(before.of(value)) as u16;
             });
         }
+        Ok(())
     }
 
     #[inline(always)]
@@ -207,10 +230,53 @@ impl Form for Colour {
     }
 
     #[inline(always)]
-    fn steps(sum: [u16; 3], factors: [u16; 3]) -> [u32; 3] {
-        let ([r, g, b], [factor_r, factor_g, factor_b]) = (sum, factors);
-        let step = |sum: u16, factor: u16| (u32::from(sum) * u32::from(factor)) >> 21;
-        [step(r, factor_r), step(g, factor_g), step(b, factor_b)]
+    fn fields(sum: [u16; 3]) -> [u32; 3] {
+        sum.map(u32::from)
+    }
+}
+
+/// What multiplies the fields of a sum: the product of a field and its factor fills 32 bits, whose upper ones are the step.
+pub(super) struct Factors([Cell<u32>; 3]);
+
+impl Factors {
+    #[inline(always)]
+    pub(super) fn new<F: Form>(factors: [u16; 3]) -> Self {
+        let ([r, g, b], [bits_r, bits_g, bits_b]) = (factors.map(u32::from), F::SHOWN);
+        Self([
+            Cell::new(r << (16 - bits_r)),
+            Cell::new(g << (16 - bits_g)),
+            Cell::new(b << (16 - bits_b)),
+        ])
+    }
+
+    /// Keeps the compiler from filling registers with factors, which the stack gives as fast.
+    #[inline(always)]
+    fn stay_in_memory(&self) {
+        black_box(self);
+    }
+
+    /// The steps of a sum.
+    #[inline(always)]
+    pub(super) fn steps<F: Form, T: Encode, const WIDE: bool>(&self, sum: F::Sum) -> [u32; 3] {
+        let Self([factor_r, factor_g, factor_b]) = self;
+        let ([r, g, b], [fields_r, fields_g, fields_b]) = (F::fields(sum), F::SHOWN);
+        let [bits_r, bits_g, bits_b] = T::BITS;
+        [
+            step::<WIDE>(r, factor_r.get(), fields_r, bits_r),
+            step::<WIDE>(g, factor_g.get(), fields_g, bits_g),
+            step::<WIDE>(b, factor_b.get(), fields_b, bits_b),
+        ]
+    }
+}
+
+/// The upper `bits` of the product of a field of so many bits and its factor.
+#[inline(always)]
+fn step<const WIDE: bool>(field: u32, factor: u32, field_bits: u32, bits: u32) -> u32 {
+    if !WIDE || bits > field_bits {
+        (field * factor) >> (32 - bits)
+    } else {
+        // The upper half of 64 bits takes one instruction.
+        ((u64::from(field) * u64::from(factor << bits)) >> 32) as u32
     }
 }
 
@@ -232,9 +298,8 @@ pub fn fill_table<F: Form>(
     light: u32,
     table: &mut F::Table,
 ) -> Result<(), RelightError> {
-    let terms = mix.terms::<F::Known>(atlas, light, F::BITS)?;
-    F::fill(table, None, &terms);
-    Ok(())
+    let weights = mix.weights(light, F::BITS)?;
+    F::fill(table, atlas, light, None, weights)
 }
 
 /// Sets the levels of one light, and multiplies out by how much it changes.
@@ -248,10 +313,10 @@ pub(super) fn fill_change<F: Form>(
     (light, levels): (u32, [u16; 3]),
     table: &mut F::Table,
 ) -> Result<(), RelightError> {
-    let before = mix.terms::<F::Known>(atlas, light, F::BITS)?;
+    let before = mix.weights(light, F::BITS)?;
+    let after = mix.weights_at(light, levels, F::BITS)?;
+    F::fill(table, atlas, light, Some(before), after)?;
     mix.set(light, levels);
-    let after = mix.terms::<F::Known>(atlas, light, F::BITS)?;
-    F::fill(table, Some(&before), &after);
     Ok(())
 }
 
@@ -266,10 +331,10 @@ pub fn full<F: Form, const K: usize, T: Encode>(
     pixels: &mut [T::Pixel],
 ) -> Result<(), RelightError> {
     check_elements(atlas, pixels.len())?;
-    let mut rows = rows::<F, K>(atlas)?;
-    finish.by_run(pixels, |pixels, factors| {
-        let own = rows.split_off(..pixels.len()).unwrap_or_default();
-        full_run::<F, K, T>(own, tables, factors, finish.tone, pixels);
+    let mut pixels = pixels;
+    finish.by_run(rows::<F, K>(atlas)?, |rows, factors| {
+        let own = pixels.split_off_mut(..rows.len()).unwrap_or_default();
+        full_run::<F, K, T>(rows, tables, factors, finish.tone, own);
     })
 }
 
@@ -282,6 +347,8 @@ fn full_run<F: Form, const K: usize, T: Encode>(
     tone: &T,
     pixels: &mut [T::Pixel],
 ) {
+    let factors = &Factors::new::<F>(factors);
+    factors.stay_in_memory();
     let (groups, rest) = rows.as_chunks();
     let (shown, rest_shown) = pixels.as_chunks_mut();
     for (rows, pixels) in groups.iter().zip(shown) {
@@ -298,7 +365,7 @@ fn full_run<F: Form, const K: usize, T: Encode>(
 fn full_group<F: Form, const K: usize, const N: usize, T: Encode>(
     rows: &[[F::Codes; K]; N],
     tables: &[F::Table; K],
-    factors: [u16; 3],
+    factors: &Factors,
     tone: &T,
     pixels: &mut [T::Pixel; N],
 ) {
@@ -310,33 +377,41 @@ fn full_group<F: Form, const K: usize, const N: usize, T: Encode>(
             }
         }
     }
-    show_group::<F, N, T>(&sums, factors, tone, pixels);
+    for (sum, pixel) in sums.into_iter().zip(pixels) {
+        show_one::<F, false, T>(sum, factors, tone, pixel);
+    }
 }
 
 /// The pixels of some sums.
 #[inline(never)]
 fn show<F: Form, T: Encode>(sums: &[F::Sum], factors: [u16; 3], tone: &T, pixels: &mut [T::Pixel]) {
-    let (groups, rest) = sums.as_chunks::<SHOWN>();
+    let factors = &Factors::new::<F>(factors);
+    if IS_SMALL {
+        factors.stay_in_memory();
+    }
+    // Written out, because a compiler that saves flash unrolls no loop.
+    let (groups, rest) = sums.as_chunks();
     let (shown, rest_shown) = pixels.as_chunks_mut();
-    for (sums, pixels) in groups.iter().zip(shown) {
-        show_group::<F, SHOWN, T>(sums, factors, tone, pixels);
-    }
-    for (sum, pixel) in rest.iter().zip(rest_shown) {
-        show_group::<F, 1, T>(array::from_ref(sum), factors, tone, array::from_mut(pixel));
-    }
+    side_by_side(groups, shown, |[a, b, c, d], [w, x, y, z]| {
+        show_one::<F, HAS_WIDE, T>(*a, factors, tone, w);
+        show_one::<F, HAS_WIDE, T>(*b, factors, tone, x);
+        show_one::<F, HAS_WIDE, T>(*c, factors, tone, y);
+        show_one::<F, HAS_WIDE, T>(*d, factors, tone, z);
+    });
+    side_by_side(rest, rest_shown, |sum, pixel| {
+        show_one::<F, HAS_WIDE, T>(*sum, factors, tone, pixel);
+    });
 }
 
 #[inline(always)]
-fn show_group<F: Form, const N: usize, T: Encode>(
-    sums: &[F::Sum; N],
-    factors: [u16; 3],
+fn show_one<F: Form, const WIDE: bool, T: Encode>(
+    sum: F::Sum,
+    factors: &Factors,
     tone: &T,
-    pixels: &mut [T::Pixel; N],
+    pixel: &mut T::Pixel,
 ) {
-    for (sum, pixel) in sums.iter().zip(pixels) {
-        *pixel = tone.encode(F::steps(*sum, factors));
-        as_it_is();
-    }
+    *pixel = tone.encode(factors.steps::<F, T, WIDE>(sum));
+    as_it_is();
 }
 
 /// Adds one light to the sums of some elements.
@@ -350,10 +425,46 @@ fn add_light<F: Form, const K: usize>(
     if light >= K {
         return;
     }
-    for (sum, row) in sums.iter_mut().zip(rows) {
-        if let Some(codes) = row.get(light) {
-            *sum = F::add(*sum, table, codes);
-        }
+    let (groups, rest) = rows.as_chunks();
+    let (added, rest_added) = sums.as_chunks_mut();
+    side_by_side(groups, added, |[a, b, c, d], [w, x, y, z]| {
+        add_one::<F, K>(a, light, table, w);
+        add_one::<F, K>(b, light, table, x);
+        add_one::<F, K>(c, light, table, y);
+        add_one::<F, K>(d, light, table, z);
+    });
+    side_by_side(rest, rest_added, |row, sum| {
+        add_one::<F, K>(row, light, table, sum)
+    });
+}
+
+#[inline(always)]
+fn add_one<F: Form, const K: usize>(
+    row: &[F::Codes; K],
+    light: usize,
+    table: &F::Table,
+    sum: &mut F::Sum,
+) {
+    if let Some(codes) = row.get(light) {
+        *sum = F::add(*sum, table, codes);
+    }
+}
+
+/// Calls `f` with one after the other of two slices of one length; nothing happens with others.
+///
+/// Two pointers that walk take fewer instructions than an index into both.
+#[inline(always)]
+fn side_by_side<A, B>(from: &[A], to: &mut [B], mut f: impl FnMut(&A, &mut B)) {
+    if from.len() != to.len() {
+        return;
+    }
+    let (mut from, mut to) = (from, to);
+    while let (Some((a, others_from)), Some((b, others_to))) =
+        (from.split_first(), mem::take(&mut to).split_first_mut())
+    {
+        f(a, b);
+        as_it_is();
+        (from, to) = (others_from, others_to);
     }
 }
 
@@ -363,21 +474,22 @@ fn as_it_is() {
     black_box(());
 }
 
-/// Sums of all elements, kept from frame to frame.
+/// Sums of all elements of an atlas of `K` lights, kept from frame to frame.
 #[derive(Debug)]
-pub struct Sums<'a, F: Form> {
+pub struct Sums<'a, F: Form, const K: usize> {
+    rows: &'a [[F::Codes; K]],
     sums: &'a mut [F::Sum],
     /// Of one light at a time.
     table: &'a mut F::Table,
 }
 
-impl<'a, F: Form> Sums<'a, F> {
-    /// Adds up a mix, light after light, in `sums` of one entry per element; `K` lights.
+impl<'a, F: Form, const K: usize> Sums<'a, F, K> {
+    /// Adds up a mix, light after light, in `sums` of one entry per element.
     ///
     /// # Errors
     /// A slice that does not fit the atlas; [`RelightError::Code`] for another form.
-    pub fn new<const K: usize>(
-        atlas: &Atlas,
+    pub fn new(
+        atlas: &Atlas<'a>,
         mix: &FrameMix,
         sums: &'a mut [F::Sum],
         table: &'a mut F::Table,
@@ -390,7 +502,7 @@ impl<'a, F: Form> Sums<'a, F> {
             fill_table::<F>(atlas, mix, light, table)?;
             add_light::<F, K>(rows, light as usize, table, sums);
         }
-        Ok(Self { sums, table })
+        Ok(Self { rows, sums, table })
     }
 
     /// The pixels of all elements.
@@ -402,30 +514,51 @@ impl<'a, F: Form> Sums<'a, F> {
         finish: &Finish<T>,
         pixels: &mut [T::Pixel],
     ) -> Result<(), RelightError> {
-        let mut sums = &*self.sums;
-        finish.by_run(pixels, |pixels, factors| {
-            let own = sums.split_off(..pixels.len()).unwrap_or_default();
-            show::<F, T>(own, factors, finish.tone, pixels);
+        check_pixels(self.sums.len(), pixels.len())?;
+        let mut pixels = pixels;
+        finish.by_run(self.sums, |sums, factors| {
+            let own = pixels.split_off_mut(..sums.len()).unwrap_or_default();
+            show::<F, T>(sums, factors, finish.tone, own);
         })
     }
 
-    /// Sets the levels of one light, corrects the sums for it, and shows them: [`Self::set`] and [`Self::apply`].
+    /// The pixels of all elements in their order, strip after strip in a buffer of any length: `send` takes each to the display.
+    ///
+    /// A strip is as long as the buffer, or ends with a run.
     ///
     /// # Errors
-    /// Slices and runs that do not fit the atlas, or no such light. Nothing has changed then.
-    pub fn change<const K: usize, T: Encode>(
+    /// Runs of another length; a buffer of none.
+    pub fn show_strips<T: Encode>(
+        &self,
+        finish: &Finish<T>,
+        strip: &mut [T::Pixel],
+        mut send: impl FnMut(&[T::Pixel]),
+    ) -> Result<(), RelightError> {
+        if strip.is_empty() {
+            return Err(RelightError::Elements { expected: 1 });
+        }
+        finish.by_run(self.sums, |sums, factors| {
+            for sums in sums.chunks(strip.len()) {
+                let strip = strip.get_mut(..sums.len()).unwrap_or_default();
+                show::<F, T>(sums, factors, finish.tone, strip);
+                send(strip);
+            }
+        })
+    }
+
+    /// Sets the levels of one light, and corrects the sums for it: [`Self::set`] and [`Self::apply`].
+    ///
+    /// # Errors
+    /// [`RelightError::Lights`] without such a light. Nothing has changed then.
+    pub fn change(
         &mut self,
         atlas: &Atlas,
         mix: &mut FrameMix,
         (light, levels): (u32, [u16; 3]),
-        finish: &Finish<T>,
-        pixels: &mut [T::Pixel],
     ) -> Result<(), RelightError> {
-        check_elements(atlas, pixels.len())?;
-        finish.check(pixels.len())?;
-        rows::<F, K>(atlas)?;
         self.set(atlas, mix, (light, levels))?;
-        self.apply::<K, T>(atlas, light, finish, pixels)
+        self.apply(light);
+        Ok(())
     }
 
     /// Sets the levels of one light, and multiplies out by how much it changes; [`Self::apply`] must follow.
@@ -441,26 +574,9 @@ impl<'a, F: Form> Sums<'a, F> {
         fill_change::<F>(atlas, mix, (light, levels), self.table)
     }
 
-    /// Corrects the sums for the light that was set, and shows them.
-    ///
-    /// # Errors
-    /// Slices and runs that do not fit the atlas. Nothing has changed then.
-    pub fn apply<const K: usize, T: Encode>(
-        &mut self,
-        atlas: &Atlas,
-        light: u32,
-        finish: &Finish<T>,
-        pixels: &mut [T::Pixel],
-    ) -> Result<(), RelightError> {
-        check_elements(atlas, pixels.len())?;
-        let mut rows = rows::<F, K>(atlas)?;
-        let (light, table, mut sums) = (light as usize, &*self.table, &mut *self.sums);
-        finish.by_run(pixels, |pixels, factors| {
-            let own = rows.split_off(..pixels.len()).unwrap_or_default();
-            let sums = sums.split_off_mut(..pixels.len()).unwrap_or_default();
-            add_light::<F, K>(own, light, table, sums);
-            show::<F, T>(sums, factors, finish.tone, pixels);
-        })
+    /// Corrects the sums for the light that was set.
+    pub fn apply(&mut self, light: u32) {
+        add_light::<F, K>(self.rows, light as usize, self.table, self.sums);
     }
 }
 
@@ -491,9 +607,12 @@ impl<'a> AnyTable<'a> {
         mix: &FrameMix,
         light: u32,
     ) -> Result<(), RelightError> {
-        let terms = mix.terms::<AllCodes>(atlas, light, [SINGLE; 3])?;
+        let (weights, values) = (
+            mix.weights(light, [SINGLE; 3])?,
+            values::<AllCodes>(atlas, light)?,
+        );
         self.0.fill(light, |channel, code| {
-            let term = terms.get(channel);
+            let term = weights.get(channel).zip(values.get(channel));
             // Below the full scale.
             term.map_or(0, |(weight, values)| {
                 weight.of(values.of::<AllCodes>(code)) as u16
@@ -527,13 +646,23 @@ pub fn full_any<T: Encode>(
             ];
         }
     });
-    let mut sums = &*sums;
-    finish.by_run(pixels, |pixels, factors| {
-        let own = sums.split_off(..pixels.len()).unwrap_or_default();
-        for (sum, pixel) in own.iter().zip(pixels) {
-            *pixel = finish.tone.encode(Colour::steps(*sum, factors));
+    let mut pixels = pixels;
+    finish.by_run(sums, |sums, factors| {
+        let factors = Factors::new::<Colour>(factors);
+        let own = pixels.split_off_mut(..sums.len()).unwrap_or_default();
+        for (sum, pixel) in sums.iter().zip(own) {
+            *pixel = finish.tone.encode(factors.steps::<Colour, T, true>(*sum));
         }
     })
+}
+
+/// Whether there is a pixel for every element.
+pub(super) fn check_pixels(elements: usize, pixels: usize) -> Result<(), RelightError> {
+    let expected = elements as u32;
+    match elements == pixels {
+        true => Ok(()),
+        false => Err(RelightError::Elements { expected }),
+    }
 }
 
 /// Every element's codes of all its `K` lights.

@@ -131,19 +131,27 @@ where
 
     // The sums of a change are those of a full frame, and undoing it restores them.
     let (mut sums, mut own) = (vec![F::Sum::default(); ELEMENTS as usize], F::EMPTY);
-    let mut kept = Sums::<F>::new::<LIGHTS>(&atlas, &mix, &mut sums, &mut own).unwrap();
+    let mut kept = Sums::<F, LIGHTS>::new(&atlas, &mix, &mut sums, &mut own).unwrap();
     let mut changed = vec![0; ELEMENTS as usize];
     kept.show(&finish, &mut changed).unwrap();
     assert_eq!(changed, pixels);
     let to = [40_000, 0, 65_535];
-    kept.change::<LIGHTS, _>(&atlas, &mut mix, (2, to), &finish, &mut changed)
-        .unwrap();
+    kept.change(&atlas, &mut mix, (2, to)).unwrap();
+    kept.show(&finish, &mut changed).unwrap();
     let mut full_again = vec![0; ELEMENTS as usize];
     full::<F, LIGHTS, _>(&atlas, &fill(&mix), &finish, &mut full_again).unwrap();
     assert_eq!(changed, full_again);
-    kept.change::<LIGHTS, _>(&atlas, &mut mix, (2, levels[2]), &finish, &mut changed)
-        .unwrap();
+    kept.change(&atlas, &mut mix, (2, levels[2])).unwrap();
+    kept.show(&finish, &mut changed).unwrap();
     assert_eq!(changed, pixels);
+    for length in [1, 7, 60, 500] {
+        let (mut strip, mut sent) = (vec![0; length], Vec::new());
+        kept.show_strips(&finish, &mut strip, |strip| sent.extend_from_slice(strip))
+            .unwrap();
+        assert_eq!(sent, pixels, "strips of {length}");
+    }
+    let refused = kept.show_strips(&finish, &mut [], |_| {});
+    assert_eq!(refused, Err(RelightError::Elements { expected: 1 }));
 
     let finish = Finish::new(&atlas, &mix, &RUNS, exposure.factor(), &BYTES).unwrap();
     let mut triples = vec![[0; 3]; ELEMENTS as usize];
@@ -211,6 +219,54 @@ fn what_does_not_fit_is_refused() {
     assert_eq!(refused, Err(elements));
     assert_eq!(mix.levels(5), Some([0; 3]));
     assert_eq!(mix.levels(6), None);
+}
+
+#[test]
+fn what_a_host_fitted_gives_the_same_frames() {
+    let bytes = atlas_bytes(Code::Lum8);
+    let atlas = Atlas::parse(&bytes).unwrap();
+    let (full_weights, exposure) = ([Rgb::WHITE; LIGHTS], exposure(&atlas).factor());
+    let fitted = Fitted::new(&atlas, &full_weights, &RUNS, exposure, &TONE).unwrap();
+    let frame = |atlas: &Atlas, mix: &mut FrameMix, finish: &Finish<Rgb565Table>| {
+        let mut tables = [Lum::EMPTY; LIGHTS];
+        for (light, table) in (0..).zip(&mut tables) {
+            mix.set(light, [30_000, 50_000, 9000 * light as u16]);
+            fill_table::<Lum>(atlas, mix, light, table).unwrap();
+        }
+        let mut pixels = vec![0; ELEMENTS as usize];
+        full::<Lum, LIGHTS, _>(atlas, &tables, finish, &mut pixels).unwrap();
+        pixels
+    };
+    let mut rooms = [[FrameLight::EMPTY; LIGHTS]; 2];
+    let [here, there] = &mut rooms;
+    let mut mix = FrameMix::new(&atlas, &full_weights, here).unwrap();
+    let finish = Finish::new(&atlas, &mix, &RUNS, exposure, &TONE).unwrap();
+    let expected = frame(&atlas, &mut mix, &finish);
+
+    let known = fitted.atlas(&bytes).unwrap();
+    let mut mix = fitted.mix(there);
+    let finish = fitted.finish(&known, &RUNS, &TONE).unwrap();
+    assert_eq!(frame(&known, &mut mix, &finish), expected);
+    assert!(fitted.finish(&known, &RUNS[1..], &TONE).is_err());
+
+    for at in 0..bytes.len() {
+        let mut damaged = bytes.clone();
+        damaged[at] ^= 0x10;
+        assert_eq!(
+            fitted.atlas(&damaged).err(),
+            Some(AtlasError::Checksum),
+            "byte {at}"
+        );
+    }
+    assert_eq!(fitted.atlas(&bytes[1..]).err(), Some(AtlasError::Checksum));
+    // Numbers that make no sense make no panic.
+    let wild = Fitted {
+        gains: [[(u16::MAX, i16::MAX), (1, i16::MIN), (7, -31)]; LIGHTS],
+        shown: [(u16::MAX, 1), (u16::MAX, -31), (u16::MAX, i16::MIN)],
+        ..fitted
+    };
+    let finish = wild.finish(&known, &RUNS, &TONE).unwrap();
+    frame(&known, &mut wild.mix(there), &finish);
 }
 
 #[test]

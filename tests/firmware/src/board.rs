@@ -71,7 +71,7 @@ pub fn ticks() -> u32 {
 
 /// Instructions of 1.024 us in a tick of 25 MHz.
 #[cfg(not(small))]
-const PER_TICK: (u64, u32) = (5, 7);
+const PER_TICK: (u32, u32) = (5, 7);
 
 /// Starts the slow timer.
 #[cfg(not(small))]
@@ -112,14 +112,15 @@ pub fn ticks() -> u32 {
 
 /// Instructions of 1.024 us in a tick of 16 MHz.
 #[cfg(small)]
-const PER_TICK: (u64, u32) = (125, 11);
+const PER_TICK: (u32, u32) = (125, 11);
 
 /// Instructions in so many ticks.
 #[inline(never)]
 pub fn instructions(ticks: u32) -> u32 {
     // A factor over a power of two.
     let (factor, shift) = PER_TICK;
-    (u64::from(ticks) * factor >> shift) as u32
+    let below = (1 << shift) - 1;
+    (ticks >> shift) * factor + ((ticks & below) * factor >> shift)
 }
 
 fn write(register: usize, value: u32) {

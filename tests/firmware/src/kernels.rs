@@ -5,11 +5,12 @@ use core::hint::black_box;
 use relume::atlas::Atlas;
 use relume::color::Rgb;
 use relume::relight::{
-    AnyTable, Colour, Finish, Form, FrameLight, FrameMix, Run, Sums, fill_table, full, full_any,
+    AnyTable, Colour, Finish, Fitted, Form, FrameLight, FrameMix, Lum, Run, Sums, fill_table, full,
+    full_any,
 };
 use relume::tone::Rgb565Table;
 
-use crate::{count, exit, hash, largest_stack, paint_stack, say};
+use crate::{Hash, count, count_with_pauses, exit, hash, largest_stack, paint_stack, say};
 
 /// White at half of the steps: twice as bright is still told apart from more.
 static TONE: Rgb565Table = Rgb565Table::new(1024);
@@ -47,9 +48,19 @@ fn same(a: u32, b: u32) {
 }
 
 /// Levels that the compiler does not know.
+#[inline(never)]
 fn volatile<const K: usize>(levels: &[[u16; 3]; K]) -> [[u16; 3]; K] {
-    // SAFETY: a reference to a plain value.
-    unsafe { core::ptr::read_volatile(levels) }
+    let mut read = [[0; 3]; K];
+    for (to, from) in read
+        .as_flattened_mut()
+        .iter_mut()
+        .zip(levels.as_flattened())
+    {
+        // SAFETY: a reference to a plain value.
+        *to = unsafe { core::ptr::read_volatile(from) };
+        black_box(());
+    }
+    read
 }
 
 /// What comes before the first frame.
@@ -81,6 +92,7 @@ fn ready<F: Form, const K: usize>(
 fn set_all(mix: &mut FrameMix, levels: &[[u16; 3]]) {
     for (light, levels) in (0..).zip(levels) {
         mix.set(light, *levels);
+        black_box(());
     }
 }
 
@@ -142,10 +154,90 @@ pub fn run_sums<F: Form, const K: usize>(
     let Ready { atlas, mix, finish } = &mut ready;
     let cold = count(|| {
         set_all(mix, &second);
-        let sums = must(Sums::<F>::new::<K>(atlas, mix, sums, table));
+        let sums = must(Sums::<F, K>::new(atlas, mix, sums, table));
         must(sums.show(finish, pixels));
     });
     report(cold, cold, hash(pixels))
+}
+
+/// An atlas of `K` lights that a host fitted.
+pub struct FittedInput<const K: usize> {
+    /// Its bytes.
+    pub atlas: &'static [u8],
+    /// What the host found.
+    pub fitted: Fitted<K>,
+    /// Two mixes, in levels.
+    pub levels: [[[u16; 3]; K]; 2],
+    /// Reflectances.
+    pub runs: &'static [Run],
+}
+
+/// A frame that is sent to a display, strip after strip.
+type Sent<'a> = &'a mut dyn FnMut(&mut dyn FnMut(&[u16]));
+
+/// The instructions of a frame, and its hash; nothing of what makes the hash is counted.
+#[inline(never)]
+fn count_strips(frame: Sent) -> (u32, u32) {
+    let (mut hash, mut strips) = (Hash::new(), 0);
+    let mut counted = |frame: Sent| {
+        let counted = count_with_pauses(|pause| {
+            frame(&mut |strip| {
+                strips += 1;
+                pause.during(|| hash.add(strip));
+            });
+        });
+        (counted, core::mem::take(&mut strips))
+    };
+    // What a strip of nothing takes.
+    let (one, _) = counted(&mut |send| send(&[]));
+    let (two, _) = counted(&mut |send| {
+        send(&[]);
+        send(&[]);
+    });
+    let (all, strips) = counted(frame);
+    (all - strips * (two - one), hash.sum())
+}
+
+/// One changed light of an atlas that a host fitted, and back; a display is sent strips.
+pub fn run_change_fitted<const K: usize>(
+    input: &'static FittedInput<K>,
+    room: &'static mut [FrameLight; K],
+    sums: &'static mut [u32],
+    table: &'static mut <Lum as Form>::Table,
+    strip: &'static mut [u16],
+) -> ! {
+    paint_stack();
+    let [first, second] = input.levels.each_ref().map(volatile);
+    let light = CHANGED as usize;
+    let (Some(before), Some(after)) = (first.get(light), second.get(light)) else {
+        exit(1)
+    };
+    // Borrowed where they are: moving an atlas takes the code of `memcpy`.
+    let Ok(atlas) = &input.fitted.atlas(input.atlas) else {
+        exit(1)
+    };
+    let Ok(finish) = &input.fitted.finish(atlas, input.runs, &TONE) else {
+        exit(1)
+    };
+    let mix = &mut input.fitted.mix(room);
+    set_all(mix, &first);
+    let Ok(kept) = &mut Sums::<Lum, K>::new(atlas, mix, sums, table) else {
+        exit(1)
+    };
+    let (_, unchanged) = count_strips(&mut |send| must(kept.show_strips(finish, strip, send)));
+    let (cold, changed) = count_strips(&mut |send| {
+        must(kept.change(atlas, mix, (CHANGED, *after)));
+        must(kept.show_strips(finish, strip, send));
+    });
+    one_index(strip, changed);
+    must(kept.set(atlas, mix, (CHANGED, *before)));
+    // What is left when the table is there already.
+    let (warm, undone) = count_strips(&mut |send| {
+        kept.apply(CHANGED);
+        must(kept.show_strips(finish, strip, send));
+    });
+    same(unchanged, undone);
+    report(cold, warm, changed)
 }
 
 /// One changed light, and back.
@@ -165,17 +257,21 @@ pub fn run_change<F: Form, const K: usize>(
     let mut ready = ready::<F, K>(input, room);
     let Ready { atlas, mix, finish } = &mut ready;
     set_all(mix, &first);
-    let mut kept = must(Sums::<F>::new::<K>(atlas, mix, sums, table));
+    let mut kept = must(Sums::<F, K>::new(atlas, mix, sums, table));
     must(kept.show(finish, pixels));
     let unchanged = hash(pixels);
     let cold = count(|| {
-        must(kept.change::<K, _>(atlas, mix, (CHANGED, *after), finish, pixels));
+        must(kept.change(atlas, mix, (CHANGED, *after)));
+        must(kept.show(finish, pixels));
     });
     let changed = hash(pixels);
     one_index(pixels, changed);
     must(kept.set(atlas, mix, (CHANGED, *before)));
     // What is left when the table is there already.
-    let warm = count(|| must(kept.apply::<K, _>(atlas, CHANGED, finish, pixels)));
+    let warm = count(|| {
+        kept.apply(CHANGED);
+        must(kept.show(finish, pixels));
+    });
     same(unchanged, hash(pixels));
     report(cold, warm, changed)
 }

@@ -24,4 +24,6 @@ pub use board::{exit, instructions, say};
 #[cfg(all(target_os = "none", not(small)))]
 pub use measure::long_count;
 #[cfg(target_os = "none")]
-pub use measure::{Lent, count, hash, hash_bytes, largest_stack, paint_stack};
+pub use measure::{
+    Hash, Lent, count, count_with_pauses, hash, hash_bytes, largest_stack, paint_stack,
+};

@@ -9,15 +9,40 @@ use crate::board::{instructions, start_timer, ticks};
 
 /// Instructions that `f` takes, without those of reading the timer.
 pub fn count(f: impl FnOnce()) -> u32 {
+    count_with_pauses(|_| f())
+}
+
+/// The same without what `f` does in pauses.
+pub fn count_with_pauses(f: impl FnOnce(&mut Pauses)) -> u32 {
     start_timer();
     let before = ticks();
     black_box(());
     let empty = ticks();
     black_box(());
-    f();
+    let mut pauses = Pauses {
+        ticks: 0,
+        read: empty - before,
+    };
+    f(&mut pauses);
     black_box(());
     let after = ticks();
-    instructions(after - empty) - instructions(empty - before)
+    instructions(after - empty - pauses.ticks) - instructions(pauses.read)
+}
+
+/// What is not counted.
+pub struct Pauses {
+    ticks: u32,
+    /// Ticks of reading the timer.
+    read: u32,
+}
+
+impl Pauses {
+    /// Does something that is not counted.
+    pub fn during(&mut self, f: impl FnOnce()) {
+        let begin = ticks();
+        f();
+        self.ticks += ticks() - begin + self.read;
+    }
 }
 
 /// Thousands of instructions that `f` takes, however many.
@@ -30,9 +55,36 @@ pub fn long_count(f: impl FnOnce()) -> u32 {
 }
 
 /// FNV-1a, 32 bits, of the bytes of pixels, low byte first.
+pub struct Hash(u32);
+
+impl Hash {
+    /// Of no pixels.
+    pub const fn new() -> Self {
+        Self(0x811c_9dc5)
+    }
+
+    /// Adds pixels.
+    #[inline(never)]
+    pub fn add(&mut self, pixels: &[u16]) {
+        for pixel in pixels {
+            for byte in [pixel & 0xff, pixel >> 8] {
+                self.0 = (self.0 ^ u32::from(byte)).wrapping_mul(0x0100_0193);
+            }
+        }
+    }
+
+    /// Of all that were added.
+    pub const fn sum(&self) -> u32 {
+        self.0
+    }
+}
+
+/// The hash of pixels.
 #[inline(never)]
 pub fn hash(pixels: &[u16]) -> u32 {
-    hash_bytes(pixels.iter().flat_map(|pixel| pixel.to_le_bytes()))
+    let mut hash = Hash::new();
+    hash.add(pixels);
+    hash.sum()
 }
 
 /// FNV-1a, 32 bits.
