@@ -52,8 +52,10 @@ const PARTS: [(&str, f64); 5] = [
     ("packing", 0.5),
     // 2.05: steps of 8.2, 4.0 and 8.2 codes make 2.4, 1.2 and 2.4 each by sqrt(1 / 12), 2.07 in all.
     ("RGB565", 2.2),
-    // 1.46: three channels of a hundred fall to the other side of a rounding.
-    ("integers", 1.7),
+    // 1.72: four channels of a hundred fall to the other side of a rounding. Red and blue are cut off to steps of 2^-10: at
+    // a twentieth of white that is half a step, 0.3 codes, too dark, so up to 4 in 100 of their roundings to 8.2 codes turn; at a
+    // fortieth up to 6: 8.2 sqrt(0.06) = 2.0.
+    ("integers", 2.0),
 ];
 
 /// The values of a CSV `point,light,r,g,b` with one light.

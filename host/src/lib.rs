@@ -38,11 +38,11 @@ pub mod mix;
 
 pub mod probe;
 
+pub mod device_cost;
+
 pub mod export;
 
 pub mod preview;
-
-pub mod device_cost;
 
 pub mod polygon_pair;
 

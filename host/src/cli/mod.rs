@@ -43,7 +43,7 @@ struct Cli {
 enum Command {
     /// Import a scene (OBJ, glTF), mesh it and solve its light
     Bake(bake::Arguments),
-    /// Pack a solution into 8-bit codes
+    /// Pack a solution into codes of few bits
     Pack(pack::Arguments),
     /// Make the picture of one mix of the lights
     Relight(relight::Arguments),

@@ -10,6 +10,8 @@ use std::fmt::Write as _;
 use relume::atlas::Atlas;
 use relume::relight::FixedWeight;
 
+use crate::device_cost::{Core, DeviceCost};
+
 /// What an atlas takes on a device that relights it in integers, multiplying on the way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cost {
@@ -43,7 +45,7 @@ impl Cost {
     }
 
     /// As the lines of a comment.
-    fn lines(&self, atlas: &Atlas) -> [String; 5] {
+    fn lines(&self, atlas: &Atlas) -> Vec<String> {
         let Self {
             flash,
             ram,
@@ -52,15 +54,26 @@ impl Cost {
             change,
         } = self;
         let (n, k) = (atlas.element_count(), atlas.light_count());
-        [
+        let devices = Core::ALL.map(|core| {
+            let DeviceCost { flash, ram, frame } = DeviceCost::new(atlas, self.flash as usize, core);
+            let name = core.name();
             format!(
-                "Relume atlas: {n} elements, {k} lights. Borrow it with relume::atlas::Atlas::parse."
+                "{name}: {flash} bytes of flash with its code, {ram} of RAM, {frame} instructions a frame (predicted)."
+            )
+        });
+        let [m0, m3, m4f] = devices;
+        vec![
+            format!(
+                "Relume atlas: {n} elements, {k} lights. Borrow it with relume::atlas::Atlas::parse, in C relume_atlas_parse."
             ),
             format!("Flash: {flash} bytes."),
             format!(
                 "RAM: {ram} bytes to relight in integers; {table} more to do so by additions alone."
             ),
-            format!("Frame: {frame} multiply-adds; one changed light: {change}."),
+            format!("Frame: {frame} multiply-adds, beside decoding; one changed light: {change}."),
+            m0,
+            m3,
+            m4f,
             match atlas.worst_error() {
                 Some(worst) => format!(
                     "Error: at most {:.2} display codes as packed, {:.2} as shown.",

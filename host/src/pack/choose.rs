@@ -169,10 +169,15 @@ struct Tried<'a> {
 }
 
 impl Search<'_> {
-    /// Encodes; `None` when the packing is too fine for its values.
+    /// Encodes; `None` when the packing is too fine for its values, or its code cannot hold them.
+    ///
+    /// Lights that shall be in tiles get the steps of the candidate, if it is in tiles too.
     fn attempt(&self, packing: Packing) -> Result<Option<Tried<'_>>, PackError> {
-        let packings = self.given.iter().map(|given| given.unwrap_or(packing));
-        let packings: Vec<Packing> = packings.collect();
+        let own = |given: &Option<Packing>| match *given {
+            Some(given) if given.code != packing.code => given,
+            _ => packing,
+        };
+        let packings: Vec<Packing> = self.given.iter().map(own).collect();
         let packed = match Packed::new(&self.source, &packings) {
             Ok(packed) => packed,
             Err(PackError::Scale(_)) => return Ok(None),
@@ -372,7 +377,7 @@ fn finest_within(full: &Search, white: f32, budget: usize) -> Result<Option<u16>
         return Ok(None);
     }
     let (mut low, mut high) = (1_u16, FINEST + 1);
-    while high - low > 1 + low / 50 {
+    while high - low > 1 {
         // Bits grow with the logarithm of the steps.
         let middle = (f32::from(low) * f32::from(high)).sqrt() as u16;
         let middle = middle.clamp(low + 1, high - 1);

@@ -9,7 +9,8 @@
 use rayon::prelude::*;
 use relume::atlas::{LARGEST_TILE_CODE, LightEntry};
 use relume::code::{
-    Code, Curve, LARGEST_PART_FIRST, LARGEST_PART_UNIT, PART_CODES, PART_STEPS, PARTS, Scale,
+    AllCodes, Code, Curve, LARGEST_PART_FIRST, LARGEST_PART_UNIT, PART_CODES, PART_STEPS, PARTS,
+    Scale,
 };
 use relume::color::Rgb;
 
@@ -93,7 +94,16 @@ pub(super) fn entries<'a>(
             }
         }
     };
-    (0..lights).into_par_iter().map(entry).collect()
+    let held = |light: usize| {
+        let entry: LightEntry = entry(light)?;
+        let mut curves = entry.curves.iter().zip(entry.last);
+        if curves.all(|(curve, last)| curve.reaches::<AllCodes>(last)) {
+            Ok(entry)
+        } else {
+            Err(PackError::Scale(entry.name.to_owned()))
+        }
+    };
+    (0..lights).into_par_iter().map(held).collect()
 }
 
 struct SolutionNames<'a> {

@@ -82,7 +82,9 @@ pub enum PackError {
     #[error(transparent)]
     Atlas(#[from] AtlasError),
     /// A contribution or emission of this light cannot be scaled.
-    #[error("light {0:?}: its values leave the range that can be packed; change its emission")]
+    #[error(
+        "light {0:?}: its values leave the range that can be packed; scale its emission, or the picture"
+    )]
     Scale(String),
     /// Nothing keeps the error that is wanted.
     #[error(

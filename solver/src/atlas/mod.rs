@@ -1,11 +1,11 @@
 //! The atlas: packed contributions of every light to every element, as bytes that live in flash.
 //!
-//! Version 3, little-endian, no alignment needed. Lengths in bytes, `n` elements, `k` lights:
+//! Version 4, little-endian, no alignment needed. Lengths in bytes, `n` elements, `k` lights:
 //!
 //! | at | what |
 //! | --- | --- |
 //! | 0 | `RELUMEAT` |
-//! | 8 | `u16` version, 3 |
+//! | 8 | `u16` version, 4 |
 //! | 10 | `u8` quantity: 0 irradiance, 1 radiosity (reflectance multiplied in), 2 radiance |
 //! | 11 | three zero bytes |
 //! | 14 | `u16` width of the image whose pixels, row by row, are the elements; 0 for an atlas of no image |

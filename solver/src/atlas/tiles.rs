@@ -12,21 +12,21 @@
 //! Each `v` is predicted from its left neighbour `a`, the upper `b`, the upper left `c` and the
 //! upper right `d`, in one of two ways ([`Predictor`]). Where light has edges (Weinberger, Seroussi and Sapiro 2000, LOCO-I,
 //! eq. 1): `min(a, b)` if `c >= max(a, b)`, `max(a, b)` if `c <= min(a, b)`, else the plane `a + b - c`. Where it is
-//! rough: the mean `(2 a + b + d) / 4`, rounded. What is left, `e`, is written as
+//! rough: the mean `(2 a + b + d) / 4`, rounded. Of a neighbour that is not in the tile [`Predictor::predict`] says what stands for it. What is left, `e`, is written as
 //! `z = 2 e` or `-2 e - 1`: `z >> m` ones, a zero, and the lower `m` bits (Rice 1979), `m`, the predictor and the share once per tile,
 //! light and channel.
 //!
-//! Little-endian, lengths in bytes, `g` grids, `t` tiles (which follow from grids and side), `k` lights of the atlas:
+//! Little-endian, lengths in bytes, `p` grids, `t` tiles (which follow from grids and side), `k` lights of the atlas:
 //!
 //! | at | what |
 //! | --- | --- |
 //! | 0 | `u8` side, 1 to [`LARGEST_SIDE`] |
 //! | 1 | `u8` bits of a first `g`, 1 to 16 |
 //! | 2 | two zero bytes |
-//! | 4 | `u32` grids `g` |
+//! | 4 | `u32` grids `p` |
 //! | 8 | `u32` tiles `t` |
 //! | 12 | `k` times `u8`: the order of the lights, every [`GROUP`] by themselves: tags less the first of the group |
-//! | | `g` grids of 4: width `u16`, height `u16`, both at least 1; together they have all elements |
+//! | | `p` grids of 4: width `u16`, height `u16`, both at least 1; together they have all elements |
 //! | | `t` times `u32`: where the bits of a tile begin, in bytes from the first |
 //! | | the bits, highest first |
 //!
@@ -94,7 +94,7 @@ impl Place {
     }
 }
 
-/// Lights that can change places.
+/// Consecutive lights that can change places: as many as a byte can tell apart.
 pub const GROUP: usize = 256;
 
 /// The most elements of a tile.

@@ -19,7 +19,7 @@
 //! term is non-negative. So the relative error of a sum is at most `e` for every number of lights,
 //! every mix and every exposure. Rounding of the tables adds less than 4e-6 of a value, that of an `f32` sum of `k`
 //! lights less than `(k + 2) 2^-24`, that of integer sums of any range less than `k 2^-30`: together below
-//! 0.83 % for 256 lights. (A decoded `f32` below 2^-141 is rounded to the grid of subnormal floats, which is
+//! 0.83 % for 256 lights. (A decoded `f32` below 2^-135 is rounded to the grid of subnormal floats, which is
 //! coarser than that; its [`Magnitude`] is not.)
 
 use super::known::exponential;

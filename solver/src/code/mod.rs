@@ -11,7 +11,7 @@
 //! | `exp8s` | 1:1410, largest value at the top | 0.002 s to 0.69 s | 0.002 s: dark | the same table |
 //! | `lum8` | 1:1410 of luminance, largest at the top | as `exp8s`, and all colour | 0.002 s: dark | the same table, once for three channels |
 //! | `display8` | smallest to largest value, any ratio | half a step: with equal ones `(C(largest) - C(smallest)) / 510` display codes | nothing, or half a step if a value is 0 | table of 256 per light and channel |
-//! | `tiles` | any, steps of 77.7 / N display codes | half a step | half a step: dark | bits, prediction, [`curve`](Curve) |
+//! | `tiles` | any, steps of as many display codes as one wants | half a step | half a step: dark | bits, prediction, [`curve`](Curve) |
 //! | `tiles-log` | all positive floats, 42 steps an octave | 0.826 % of the value | nothing | bits, prediction, [`curve`](Curve) |
 //!
 //! Exponential code: adjustable global illumination with per-light lightmaps, section 2.3; luminance
