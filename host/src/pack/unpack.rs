@@ -132,9 +132,6 @@ mod tests {
     #[test]
     fn an_atlas_that_memory_cannot_hold_is_refused() {
         let side = 1024_u16.to_le_bytes();
-        let mut tiles = vec![16, 4, 0, 0, 1, 0, 0, 0, 0, 16, 0, 0];
-        tiles.extend(side.into_iter().chain(side));
-        tiles.extend([0; 4 * 4096]);
         let light = LightEntry {
             name: "",
             emission: Rgb::WHITE,
@@ -143,6 +140,10 @@ mod tests {
             last: [255; 3],
         };
         let with = |lights: usize| {
+            let mut tiles = vec![16, 4, 0, 0, 1, 0, 0, 0, 0, 16, 0, 0];
+            tiles.extend((0..lights).map(|light| light as u8));
+            tiles.extend(side.into_iter().chain(side));
+            tiles.extend([0; 4 * 4096]);
             let contents = Contents {
                 quantity: Quantity::Irradiance,
                 lights: &vec![light; lights],
