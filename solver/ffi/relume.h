@@ -89,7 +89,7 @@ typedef struct RelumeInfo {
   uint32_t width;
   // See `width`.
   uint32_t height;
-  // Bytes of memory of a frame; 0 when the codes of the atlas are not for frames.
+  // Bytes of memory of a frame, a multiple of 4; 0 where they cannot be counted.
   size_t frame_memory;
 } RelumeInfo;
 
@@ -189,12 +189,13 @@ enum RelumeStatus relume_frame_make(const struct RelumeAtlas *atlas,
                                     size_t bytes,
                                     struct RelumeFrame *frame);
 
-// Sets the levels of all lights, and adds them up.
+// Sets the levels of all lights, and adds them up. For an atlas that is neither all in `lum8` nor all in codes of three bytes,
+// the table of a light is kept as long as its levels stay.
 enum RelumeStatus relume_frame_full(struct RelumeFrame *frame,
                                     const struct RelumeLevels *levels,
                                     size_t lights);
 
-// Sets the levels of one light; the bits are those of `relume_frame_full`.
+// Sets the levels of one light; the bits are those of `relume_frame_full`. An atlas whose tables are kept is added up anew.
 enum RelumeStatus relume_frame_change(struct RelumeFrame *frame,
                                       uint32_t light,
                                       const struct RelumeLevels *levels);

@@ -98,6 +98,9 @@ int main(void) {
         expect(relume_atlas_light(&atlas, light, &found), RELUME_STATUS_OK, &wrong);
         full[light] = found.emission;
     }
+    expect(relume_frame_make(&atlas, full, LIGHTS, memory, info.frame_memory - 4, &frame), RELUME_STATUS_LENGTH,
+           &wrong);
+    expect(relume_frame_make(&atlas, full, LIGHTS, NULL, sizeof memory, &frame), RELUME_STATUS_NULL, &wrong);
     expect(relume_frame_make(&atlas, full, LIGHTS, memory, sizeof memory, &frame), RELUME_STATUS_OK, &wrong);
 
     uint32_t before = instructions();
@@ -105,6 +108,11 @@ int main(void) {
     uint32_t sums_in = instructions() - before;
     say("count_sums", sums_in);
     say("full_565", show(&wrong));
+    before = instructions();
+    expect(relume_frame_full(&frame, second, LIGHTS), RELUME_STATUS_OK, &wrong);
+    sums_in = instructions() - before;
+    say("count_again", sums_in);
+    say("again_565", show(&wrong));
     before = instructions();
     expect(relume_frame_rgb565(&frame, &finish, &relume_rgb565_bright, pixels.rgb565, ELEMENTS),
            RELUME_STATUS_OK, &wrong);

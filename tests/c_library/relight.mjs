@@ -59,6 +59,8 @@ function show(name) {
 
 must(relume.relume_frame_full(frame, second, lights));
 show("full_565");
+must(relume.relume_frame_full(frame, second, lights));
+show("again_565");
 must(relume.relume_frame_rgb888(frame, finish, relume.relume_rgb888_bright.value, pixels, elements));
 console.log(`full_888 ${hash(pixels, 3 * elements)}`);
 must(relume.relume_frame_full(frame, first, lights));

@@ -70,7 +70,7 @@ pub struct RelumeInfo {
     pub width: u32,
     /// See `width`.
     pub height: u32,
-    /// Bytes of memory of a frame; 0 when the codes of the atlas are not for frames.
+    /// Bytes of memory of a frame, a multiple of 4; 0 where they cannot be counted.
     pub frame_memory: usize,
 }
 

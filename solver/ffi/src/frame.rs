@@ -6,8 +6,8 @@ use relume::atlas::Atlas;
 use relume::code::Code;
 use relume::color::Rgb;
 use relume::relight::{
-    Colour, Encode, Finish, Form, FrameLight, FrameMix, Lum, Run, add_lights, change_light,
-    show_sums,
+    AnyTable, Colour, Encode, Finish, Form, FrameLight, FrameMix, Lum, Run, add_any, add_lights,
+    change_light, show_sums, table_length,
 };
 use relume::tone::{Rgb565Table, Rgb888Table};
 
@@ -118,7 +118,7 @@ pub(crate) struct Frame {
     sums: Kept,
 }
 
-/// Sums and the table of one light, in the form of the atlas.
+/// Sums and the table of one light, in the form of the atlas; where no form fits it, the table of all lights.
 #[derive(Debug)]
 enum Kept {
     Lum(&'static mut <Lum as Form>::Table, &'static mut [u32]),
@@ -126,11 +126,19 @@ enum Kept {
         &'static mut <Colour as Form>::Table,
         &'static mut [[u16; 3]],
     ),
+    Any(AnyTable<'static>, &'static mut [[u16; 3]]),
+}
+
+/// Which of [`Kept`] an atlas takes.
+enum Kind {
+    Lum,
+    Colour,
+    Any,
 }
 
 /// How the memory of a frame is laid out, in bytes: a table, sums of all elements, and its lights.
 struct Layout {
-    is_lum: bool,
+    kind: Kind,
     sums: usize,
     lights: usize,
     end: usize,
@@ -138,18 +146,21 @@ struct Layout {
 
 impl Layout {
     fn new(atlas: &Atlas) -> Option<Self> {
-        let is_lum = atlas.lights().all(|light| light.code == Code::Lum8);
-        let is_colour = atlas.lights().all(|light| light.code.bytes() == 3);
-        let (table, sum) = match (is_lum, is_colour) {
-            (true, _) => (size_of::<<Lum as Form>::Table>(), size_of::<u32>()),
-            (_, true) => (size_of::<<Colour as Form>::Table>(), size_of::<[u16; 3]>()),
-            _ => return None,
+        let (kind, table, sum) = if atlas.lights().all(|light| light.code == Code::Lum8) {
+            let table = size_of::<<Lum as Form>::Table>();
+            (Kind::Lum, table, size_of::<u32>())
+        } else if atlas.lights().all(|light| light.code.bytes() == 3) {
+            let table = size_of::<<Colour as Form>::Table>();
+            (Kind::Colour, table, size_of::<[u16; 3]>())
+        } else {
+            let table = table_length(atlas).checked_mul(size_of::<u16>())?;
+            (Kind::Any, table, size_of::<[u16; 3]>())
         };
         let bytes = |count: u32, size: usize| usize::try_from(count).ok()?.checked_mul(size);
         let sums = bytes(atlas.element_count(), sum)?.checked_add(table)?;
         let lights = bytes(atlas.light_count(), size_of::<FrameLight>())?;
         Some(Self {
-            is_lum,
+            kind,
             sums: table,
             lights: sums,
             end: sums.checked_add(lights)?.checked_next_multiple_of(4)?,
@@ -157,7 +168,7 @@ impl Layout {
     }
 }
 
-/// Bytes of memory of a frame; `None` for codes that frames do not read.
+/// Bytes of memory of a frame; `None` where they cannot be counted.
 pub(crate) fn memory(atlas: &Atlas) -> Option<usize> {
     Some(Layout::new(atlas)?.end)
 }
@@ -179,7 +190,7 @@ pub unsafe extern "C" fn relume_frame_make(
             unsafe { (*shared(atlas)?.get()?, values(full.cast::<Rgb>(), lights)?) };
         // SAFETY: by the rules.
         let (memory, frame) = unsafe { (values_mut(memory, bytes / 4)?, exclusive(frame)?) };
-        let layout = Layout::new(&atlas).ok_or(RelumeStatus::Code)?;
+        let layout = Layout::new(&atlas).ok_or(RelumeStatus::Length)?;
         if bytes < layout.end || lights != atlas.light_count() as usize {
             return Err(RelumeStatus::Length);
         }
@@ -188,26 +199,35 @@ pub unsafe extern "C" fn relume_frame_make(
         let elements = atlas.element_count() as usize;
         // SAFETY: the parts of the layout do not overlap, end inside the memory, and are aligned: the memory to 4 bytes
         // and a table and sums to 4 or, with all behind them, to 2. Zeros are integers, and lights are written first.
-        let (own, sums) = unsafe {
+        let (own, table, sums) = unsafe {
             let own = start.add(layout.lights).cast::<FrameLight>();
             for light in 0..lights {
                 own.add(light).write(FrameLight::EMPTY);
             }
-            let (table, sums) = (start.cast(), start.add(layout.sums));
-            let kept = if layout.is_lum {
-                Kept::Lum(&mut *table, values_mut(sums.cast(), elements)?)
-            } else {
-                Kept::Colour(&mut *table.cast(), values_mut(sums.cast(), elements)?)
-            };
-            (values_mut(own, lights)?, kept)
+            (values_mut(own, lights)?, start, start.add(layout.sums))
         };
         let mix = FrameMix::new(&atlas, full, own)?;
+        // SAFETY: as above.
+        let sums = unsafe {
+            match layout.kind {
+                Kind::Lum => Kept::Lum(&mut *table.cast(), values_mut(sums.cast(), elements)?),
+                Kind::Colour => {
+                    Kept::Colour(&mut *table.cast(), values_mut(sums.cast(), elements)?)
+                }
+                Kind::Any => {
+                    let table = values_mut(table.cast(), table_length(&atlas))?;
+                    let table = AnyTable::new(&atlas, &mix, table)?;
+                    Kept::Any(table, values_mut(sums.cast(), elements)?)
+                }
+            }
+        };
         *frame = RelumeFrame::new(Frame { atlas, mix, sums });
         Ok(())
     })())
 }
 
-/// Sets the levels of all lights, and adds them up.
+/// Sets the levels of all lights, and adds them up. For an atlas that is neither all in `lum8` nor all in codes of three bytes,
+/// the table of a light is kept as long as its levels stay.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn relume_frame_full(
     frame: *mut RelumeFrame,
@@ -222,17 +242,23 @@ pub unsafe extern "C" fn relume_frame_full(
             return Err(RelumeStatus::Length);
         }
         for (light, levels) in (0..).zip(levels) {
-            mix.set(light, (*levels).into());
+            let levels = (*levels).into();
+            let is_new = mix.levels(light) != Some(levels);
+            mix.set(light, levels);
+            if let (true, Kept::Any(table, _)) = (is_new, &mut *sums) {
+                table.update(atlas, mix, light)?;
+            }
         }
         match sums {
             Kept::Lum(table, sums) => add_lights::<Lum>(atlas, mix, table, sums)?,
             Kept::Colour(table, sums) => add_lights::<Colour>(atlas, mix, table, sums)?,
+            Kept::Any(table, sums) => add_any(atlas, table, sums)?,
         }
         Ok(())
     })())
 }
 
-/// Sets the levels of one light; the bits are those of `relume_frame_full`.
+/// Sets the levels of one light; the bits are those of `relume_frame_full`. An atlas whose tables are kept is added up anew.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn relume_frame_change(
     frame: *mut RelumeFrame,
@@ -247,6 +273,11 @@ pub unsafe extern "C" fn relume_frame_change(
         match sums {
             Kept::Lum(table, sums) => change_light::<Lum>(atlas, mix, change, table, sums)?,
             Kept::Colour(table, sums) => change_light::<Colour>(atlas, mix, change, table, sums)?,
+            Kept::Any(table, sums) => {
+                mix.set(light, change.1);
+                table.update(atlas, mix, light)?;
+                add_any(atlas, table, sums)?;
+            }
         }
         Ok(())
     })())
@@ -301,7 +332,9 @@ unsafe fn show<T: Encode>(
     let finish = Finish::new(atlas, mix, runs, finish.exposure, table)?;
     match sums {
         Kept::Lum(_, sums) => show_sums::<Lum, T>(atlas, sums, &finish, pixels)?,
-        Kept::Colour(_, sums) => show_sums::<Colour, T>(atlas, sums, &finish, pixels)?,
+        Kept::Colour(_, sums) | Kept::Any(_, sums) => {
+            show_sums::<Colour, T>(atlas, sums, &finish, pixels)?;
+        }
     }
     Ok(())
 }

@@ -31,7 +31,7 @@ pub use fitted::Fitted;
 pub use fixed::{FixedMix, FixedTable, FixedWeight, Terms, change_fixed, relight_fixed};
 pub use float::{DecodeTable, relight};
 pub use frame::{Encode, Finish, FrameLight, FrameMix, Run, STEPS};
-pub use packed::{AnyTable, Colour, Form, Lum, Sums, fill_table, full, full_any};
+pub use packed::{AnyTable, Colour, Form, Lum, Sums, add_any, fill_table, full, full_any};
 pub use wide::{Wide, WideWeight, relight_wide};
 
 /// Why a relight cannot be done.

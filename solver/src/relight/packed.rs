@@ -622,19 +622,13 @@ impl<'a> AnyTable<'a> {
     }
 }
 
-/// The pixels of all elements of an atlas in any codes; `sums` is scratch of one entry per element.
+/// Adds up all lights of an atlas in any codes, in `sums` of one entry per element.
 ///
 /// # Errors
-/// Slices and runs that do not fit the atlas.
-pub fn full_any<T: Encode>(
-    atlas: &Atlas,
-    table: &AnyTable,
-    finish: &Finish<T>,
-    sums: &mut [[u16; 3]],
-    pixels: &mut [T::Pixel],
-) -> Result<(), RelightError> {
+/// A slice that does not fit the atlas.
+#[inline(never)]
+pub fn add_any(atlas: &Atlas, table: &AnyTable, sums: &mut [[u16; 3]]) -> Result<(), RelightError> {
     check_elements(atlas, sums.len())?;
-    check_elements(atlas, pixels.len())?;
     sums.fill([0; 3]);
     atlas.for_each(|element, light, [code_r, code_g, code_b]| {
         if let Some(sum) = sums.get_mut(element as usize) {
@@ -646,6 +640,22 @@ pub fn full_any<T: Encode>(
             ];
         }
     });
+    Ok(())
+}
+
+/// The pixels of all elements of an atlas in any codes; `sums` is scratch of one entry per element.
+///
+/// # Errors
+/// Slices and runs that do not fit the atlas.
+pub fn full_any<T: Encode>(
+    atlas: &Atlas,
+    table: &AnyTable,
+    finish: &Finish<T>,
+    sums: &mut [[u16; 3]],
+    pixels: &mut [T::Pixel],
+) -> Result<(), RelightError> {
+    check_elements(atlas, pixels.len())?;
+    add_any(atlas, table, sums)?;
     let mut pixels = pixels;
     finish.by_run(sums, |sums, factors| {
         let factors = Factors::new::<Colour>(factors);
