@@ -626,7 +626,7 @@ impl<'a> AnyTable<'a> {
 ///
 /// # Errors
 /// A slice that does not fit the atlas.
-#[inline(never)]
+#[inline(always)]
 pub fn add_any(atlas: &Atlas, table: &AnyTable, sums: &mut [[u16; 3]]) -> Result<(), RelightError> {
     check_elements(atlas, sums.len())?;
     sums.fill([0; 3]);
