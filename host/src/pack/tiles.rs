@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 use relume::atlas::{
-    ESCAPE, FIRST_BITS, FULL_BITS, GROUP, LARGEST_SIDE, LightEntry, PREDICTED, Place, Predictor,
-    Share, places,
+    ESCAPE, FIRST_BITS, FULL_BITS, LARGEST_SIDE, LightEntry, PREDICTED, Place, Predictor, Share,
+    places, tags,
 };
 use relume::color::Rgb;
 use relume::mesh::{Element, Face};
@@ -111,10 +111,8 @@ fn table(
     let largest = planes.iter().flatten().map(|code| code[1]).max();
     let first_bits = (u16::BITS - largest.unwrap_or(0).leading_zeros()).max(1);
     let places: Vec<Place> = places(grids.iter().copied(), side).collect();
-    let groups = (0..).step_by(GROUP).zip(order.chunks(GROUP));
-    let tags = groups.flat_map(|(first, tags)| tags.iter().map(move |t| first + usize::from(*t)));
-    let ordered: Vec<&[[u16; 3]]> = tags
-        .filter_map(|tag| Some(&planes[tiled.binary_search(&tag).ok()?][..]))
+    let ordered: Vec<&[[u16; 3]]> = tags(order)
+        .filter_map(|tag| Some(&planes[tiled.binary_search(&(tag as usize)).ok()?][..]))
         .collect();
     let tiles: Vec<Vec<u8>> = places
         .par_iter()

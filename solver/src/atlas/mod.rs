@@ -44,7 +44,7 @@ pub(crate) use read::Group;
 pub use read::{Atlas, AtlasMesh};
 pub use tiles::{
     ESCAPE, FIRST_BITS, FULL_BITS, GROUP, LARGEST_SIDE, PREDICTED, Place, Predictor, Share,
-    TileBits, Tiles, places,
+    TileBits, Tiles, places, tags,
 };
 pub use write::{Contents, LightEntry, size, write};
 

@@ -288,7 +288,7 @@ impl<'a> Atlas<'a> {
         self.codes
     }
 
-    /// All lights, in groups of equally many bytes of code.
+    /// All lights in the order of their tags, in groups of equally many bytes of code.
     pub(crate) fn groups(&self) -> impl Iterator<Item = Group<'a>> + use<'a> {
         let atlas = *self;
         let (mut light, mut start) = (0, 0);
@@ -298,11 +298,11 @@ impl<'a> Atlas<'a> {
             while bytes_of(light) == Some(code_bytes) {
                 light += 1;
             }
-            let from = start;
-            start += code_bytes * (light - first) as usize;
+            let (from, lights) = (start, (light - first) as usize);
+            start += code_bytes * lights;
             Some(Group {
                 code_bytes,
-                lights: first as usize..light as usize,
+                lights,
                 codes: atlas.codes.chunks_exact(atlas.stride.max(1)),
                 place: from..start,
             })
@@ -420,12 +420,13 @@ impl<'a> Atlas<'a> {
     }
 }
 
-/// Lights one after the other whose codes have equally many bytes: none in tiles.
+/// Lights one after the other whose codes have equally many bytes: none if they are in tiles.
 #[derive(Debug)]
 pub(crate) struct Group<'a> {
     /// Bytes per element and light.
     pub code_bytes: usize,
-    lights: Range<usize>,
+    /// How many lights.
+    pub lights: usize,
     /// The codes of every element for all lights.
     codes: ChunksExact<'a, u8>,
     /// Where those of these lights stand.
@@ -433,11 +434,6 @@ pub(crate) struct Group<'a> {
 }
 
 impl<'a> Group<'a> {
-    /// Tags of the lights.
-    pub(crate) fn lights(&self) -> Range<usize> {
-        self.lights.clone()
-    }
-
     /// The codes of every element for these lights.
     pub(crate) fn rows<const N: usize>(&self) -> impl Iterator<Item = &'a [[u8; N]]> + use<'a, N> {
         let place = self.place.clone();

@@ -168,8 +168,7 @@ impl<'a> Tiles<'a> {
 
     /// Tags of all lights, of which a tile's bits have those in tiles in this order.
     pub fn order(&self) -> impl Iterator<Item = u32> + use<'a> {
-        let groups = (0..).step_by(GROUP).zip(self.order.chunks(GROUP));
-        groups.flat_map(|(first, tags)| tags.iter().map(move |tag| first + u32::from(*tag)))
+        tags(self.order)
     }
 
     /// Width and height of every grid.
@@ -190,6 +189,12 @@ impl<'a> Tiles<'a> {
         });
         places(self.grids(), self.side).zip(bits)
     }
+}
+
+/// The tags of all lights from their order, every [`GROUP`] by themselves.
+pub fn tags(order: &[u8]) -> impl Iterator<Item = u32> {
+    let groups = (0..).step_by(GROUP).zip(order.chunks(GROUP));
+    groups.flat_map(|(first, tags)| tags.iter().map(move |tag| first + u32::from(*tag)))
 }
 
 /// Whether every number below the length is there; no more than [`GROUP`].

@@ -3,7 +3,7 @@
 //! Four elements grow together: an addition waits for the one before it in the same sum, and what one element looked up
 //! of a light is still near for the next. Sums do not depend on it, as every element meets its lights in the order of their tags.
 
-use crate::atlas::Group;
+use crate::atlas::{Atlas, Group};
 
 /// The values of all codes of a light: of red, green and blue.
 pub(super) type Values<T> = [[T; 256]; 3];
@@ -30,8 +30,35 @@ pub(super) trait Sum: Copy {
     ) -> [Self::Value; 4];
 }
 
+/// Adds all lights to the sums of all elements; `tables` has an entry per light, or none at all, and `weights` has one, too.
+/// `add` adds what is in none of the tables.
+pub(super) fn add_all<'v, S: Sum<Value: 'v>>(
+    atlas: &Atlas,
+    tables: &'v [Values<S::Value>],
+    weights: impl Iterator<Item = S::Weight> + Clone,
+    sums: &mut [S],
+    add: impl Fn(&mut S, u32, [u16; 3]),
+) {
+    let groups = atlas.groups().filter(|_| !tables.is_empty());
+    let mut lights = tables.iter().zip(weights);
+    for group in groups {
+        add_group(&group, lights.clone().take(group.lights), sums);
+        lights.by_ref().take(group.lights).for_each(drop);
+    }
+    let add = |element: u32, light, codes| {
+        if let Some(sum) = sums.get_mut(element as usize) {
+            add(sum, light, codes);
+        }
+    };
+    if tables.is_empty() {
+        atlas.for_each(add);
+    } else {
+        atlas.for_each_in_tiles(None, add);
+    }
+}
+
 /// Adds a group of lights to the sums of all elements; `lights` are their values and weights.
-pub(super) fn add_group<'v, S: Sum<Value: 'v>>(
+fn add_group<'v, S: Sum<Value: 'v>>(
     group: &Group,
     lights: impl Iterator<Item = (&'v Values<S::Value>, S::Weight)> + Clone,
     sums: &mut [S],

@@ -9,7 +9,9 @@
 //! Error: half a unit for every contribution, 2^-16 of it from `W`, and for the exponential code half of 2^-13 scales
 //! from its table; [`FixedMix::error_bound`] sums them up.
 
-use super::bytes::{Sum, Values, add_group, of_colour};
+use core::iter;
+
+use super::bytes::{Sum, Values, add_all, of_colour};
 use super::{CodeTable, RelightError, check_elements, check_lights};
 use crate::atlas::Atlas;
 use crate::code::{Curve, DECODED_BITS, Scale};
@@ -69,13 +71,9 @@ pub trait Terms {
     /// What a light contributes to an element that has these codes of it.
     fn terms(&self, light: u32, codes: [u16; 3]) -> [u32; 3];
 
-    /// Adds what all lights contribute to all elements.
-    fn add_all(&self, atlas: &Atlas, sums: &mut [[u32; 3]]) {
-        atlas.for_each(|element, light, codes| {
-            if let Some(sum) = sums.get_mut(element as usize) {
-                add(sum, self.terms(light, codes));
-            }
-        });
+    /// What every light contributes by each of 256 codes, if it is multiplied out already; else nothing.
+    fn of_bytes(&self) -> &[[[u32; 256]; 3]] {
+        &[]
     }
 }
 
@@ -244,22 +242,8 @@ impl Terms for FixedTable<'_> {
         [term(0, r), term(1, g), term(2, b)]
     }
 
-    fn add_all(&self, atlas: &Atlas, sums: &mut [[u32; 3]]) {
-        let tables = self.0.of_bytes();
-        for group in atlas.groups() {
-            let own = tables.get(group.lights()).unwrap_or_default();
-            add_group(&group, own.iter().map(|table| (table, ())), sums);
-        }
-        let add = |element: u32, light, codes| {
-            if let Some(sum) = sums.get_mut(element as usize) {
-                add(sum, self.terms(light, codes));
-            }
-        };
-        if tables.is_empty() {
-            atlas.for_each(add);
-        } else {
-            atlas.for_each_in_tiles(None, add);
-        }
+    fn of_bytes(&self) -> &[Values<u32>] {
+        self.0.of_bytes()
     }
 }
 
@@ -298,7 +282,16 @@ pub fn relight_fixed(
 ) -> Result<(), RelightError> {
     check_elements(atlas, sums.len())?;
     sums.fill([0; 3]);
-    terms.add_all(atlas, sums);
+    let weights = iter::repeat(());
+    add_all(
+        atlas,
+        terms.of_bytes(),
+        weights,
+        sums,
+        |sum, light, codes| {
+            add(sum, terms.terms(light, codes));
+        },
+    );
     Ok(())
 }
 

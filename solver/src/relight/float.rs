@@ -1,6 +1,6 @@
 //! The sum in `f32`.
 
-use super::bytes::{Sum, Values, add_group, of};
+use super::bytes::{Sum, Values, add_all, of};
 use super::{CodeTable, RelightError, check_elements, check_mix};
 use crate::atlas::Atlas;
 use crate::color::Rgb;
@@ -48,22 +48,12 @@ pub fn relight(
     check_elements(atlas, irradiance.len())?;
     irradiance.fill(Rgb::BLACK);
     let tables = table.0.of_bytes();
-    for group in atlas.groups() {
-        let own = tables.get(group.lights()).zip(mix.get(group.lights()));
-        let (tables, mix) = own.unwrap_or_default();
-        add_group(&group, tables.iter().zip(mix.iter().copied()), irradiance);
-    }
-    let add = |element: u32, light: u32, codes| {
-        let sum = irradiance.get_mut(element as usize);
-        if let (Some(sum), Some(weight)) = (sum, mix.get(light as usize)) {
+    let weights = mix.iter().copied();
+    add_all(atlas, tables, weights, irradiance, |sum, light, codes| {
+        if let Some(weight) = mix.get(light as usize) {
             *sum += *weight * table.decode(light, codes);
         }
-    };
-    if tables.is_empty() {
-        atlas.for_each(add);
-    } else {
-        atlas.for_each_in_tiles(None, add);
-    }
+    });
     Ok(())
 }
 
