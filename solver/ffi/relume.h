@@ -23,7 +23,7 @@
 #include <stdint.h>
 
 // Words of memory for each light of `relume_irradiance`.
-#define RELUME_LIGHT_WORDS 20
+#define RELUME_LIGHT_WORDS 24
 
 // How a call ended.
 typedef enum RelumeStatus {
@@ -74,7 +74,7 @@ typedef struct RelumeRgb888Table RelumeRgb888Table;
 // A parsed atlas, which borrows its bytes. What is in it is the library's.
 typedef struct RelumeAtlas {
   uint32_t made;
-  uint64_t words[28];
+  uint64_t words[30];
 } RelumeAtlas;
 
 // What an atlas holds.

@@ -35,7 +35,7 @@ function hash(start, length) {
   return sum >>> 0;
 }
 
-const atlas = take(232);
+const atlas = take(248);
 must(relume.relume_atlas_parse(put(bytes, Uint8Array), bytes.length, atlas));
 const info = take(24);
 must(relume.relume_atlas_info(atlas, info));
@@ -69,7 +69,7 @@ show("change_565");
 must(relume.relume_frame_change(frame, scene.changed, light(first, scene.changed)));
 show("undone_565");
 
-const [scratch, sums, unit] = [take(4 * 20 * lights), take(12 * elements), take(4)];
-must(relume.relume_irradiance(atlas, full, full, lights, scratch, 20 * lights, sums, elements, unit));
+const [scratch, sums, unit] = [take(4 * 24 * lights), take(12 * elements), take(4)];
+must(relume.relume_irradiance(atlas, full, full, lights, scratch, 24 * lights, sums, elements, unit));
 console.log(`irradiance ${hash(sums, 12 * elements)}\nunit ${hash(unit, 4)}`);
 if (relume.relume_atlas_parse(0, 1, atlas) !== 1) throw new Error("null is not refused");

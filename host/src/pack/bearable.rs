@@ -6,8 +6,8 @@
 //! * its channel alone, where `3 t` are: then the exposure follows the luminance, `0.2126 R + 0.7152 G + 0.0722 B`, and blue is
 //!   up to 14 times overexposed,
 //! * its light among all others at their nominal emission, 16 times overexposed, where `3 t` are,
-//! * all three of what is shown, with the reflectance of the element, where half as much again is bearable,
-//! * above white any state, if the relative error times 112.09 is at most `2.1 t`: that is the display error where this light is
+//! * all three of what is shown, with the reflectance of the element,
+//! * above white any state, if the relative error times 112.09 is at most `2.2 t`: that is the display error where this light is
 //!   dimmed among others and dominates an element.
 //!
 //! Mixes of several lights are off by the sum of what their lights are off by; see [`rounding`](super::rounding).
@@ -43,11 +43,8 @@ pub(super) const STATES: usize = 3;
 /// What shows as white in every state, packed and shown.
 pub(super) type States = [[f32; 2]; STATES];
 
-/// How much more is bearable of what is shown.
-pub(super) const MORE_SHOWN: f32 = 1.5;
-
 /// Bearable relative error above white, times [`CODES_PER_RATIO`].
-const BEARABLE_RATIO: f32 = 2.1;
+const BEARABLE_RATIO: f32 = 2.2;
 
 /// The state of all lights at their nominal emission.
 pub(super) fn all_on<'a>(
@@ -86,6 +83,19 @@ impl Stage {
         Self {
             reflectances,
             overexposed: overexposed.map(|white| white / OVEREXPOSED),
+        }
+    }
+
+    /// White of a light alone: what is packed or, if that is less, what the brightest surface shows as white.
+    pub(super) fn white(&self, own: impl Iterator<Item = Rgb> + Clone) -> f32 {
+        let reflectances = self.reflectances.iter().map(|rho| rho.max_channel());
+        let brightest = reflectances.fold(0.0, f32::max);
+        let [packed, shown] = whites(own, &self.reflectances);
+        // Where nothing is shown, nothing is off.
+        if shown > 0.0 {
+            packed.min(shown / brightest)
+        } else {
+            packed
         }
     }
 
@@ -148,14 +158,10 @@ impl Sample {
             let ratio = tolerance * BEARABLE_RATIO / CODES_PER_RATIO;
             [low, high] = [self.value * (1.0 - ratio), self.value * (1.0 + ratio)];
         }
-        let bearable = BEARABLE.map(|codes| [codes * tolerance, codes * tolerance * MORE_SHOWN]);
-        let states = self.whites.iter().zip(&self.shown).zip(&bearable);
+        let states = self.whites.iter().zip(&self.shown).zip(BEARABLE);
         let states = states.flat_map(|((whites, shown), bearable)| {
-            whites
-                .iter()
-                .zip(shown)
-                .zip(bearable)
-                .map(|((w, s), b)| (*w, *s, *b))
+            let both = whites.iter().zip(shown);
+            both.map(move |(white, shown)| (*white, *shown, bearable * tolerance))
         });
         // A colour or a place that shows nothing bears everything.
         for (white, shown, bearable) in

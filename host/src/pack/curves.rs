@@ -1,10 +1,13 @@
 //! What the codes of every light stand for.
 //!
 //! `exp8` has one scale, as published; `exp8s` and `lum8` put the largest value of a light at their top.
-//! `display8` has 256 levels for every channel of a light, in 16 parts of equal steps (see [`Curve::Parts`]). A level may
-//! stand for a value where it [bears](super::bearable) that at a tolerance `t`. So every value has an interval, and each part in turn takes the longest steps with which a level falls into all intervals
-//! that begin before its end: where values are rare, above all in hot spots, levels are too. The least `t` with
-//! which the levels suffice is searched.
+//! `display8` has 256 levels for every channel of a light, in 32 parts of equal steps (see [`Curve::Parts`]). A level may
+//! stand for a value where it [bears](super::bearable) that at a tolerance `t`. So every value has an interval, and a part
+//! has steps with which a level falls into all intervals that begin before its end, as long as possible: where values are rare, above all in
+//! hot spots, levels are too. The least `t` with which the levels suffice is searched.
+//!
+//! Steps of `tiles` are uniform on a display up to the white of a light alone, be it what is packed or, on the
+//! brightest surface, what is shown.
 
 use rayon::prelude::*;
 use relume::atlas::{LARGEST_TILE_CODE, LightEntry};
@@ -29,6 +32,9 @@ const MOST_TOLERANCE: f32 = 64.0;
 
 /// The part of a tolerance that the first level takes.
 const DARKEST: f32 = 0.25;
+
+/// Beginnings of a curve that are followed up.
+const KEPT: usize = 4;
 
 /// Ratio of two tolerances that are not told apart.
 const TOLERANCE: f32 = 1.01;
@@ -70,7 +76,7 @@ pub(super) fn entries<'a>(
             }
             Code::Tiles | Code::TilesLog => {
                 let curve = if packing.code == Code::Tiles {
-                    let white = scale_or_one(white(own()) * packing.white);
+                    let white = scale_or_one(stage.white(own()) * packing.white);
                     Curve::display(white, packing.step)
                 } else {
                     let positive = own().flat_map(Rgb::to_array).filter(|value| *value > 0.0);
@@ -206,7 +212,7 @@ fn parts(samples: &[Sample], white: Scale, tolerance: f32) -> Option<Curve> {
     let ends = samples.iter().zip(&intervals).map(|(s, [_, end])| (s, end));
     let (darkest, _) = ends.min_by(|(_, a), (_, b)| a.total_cmp(b))?;
     let first = (unit(darkest.interval(DARKEST * tolerance)[1]) / 256.0).floor();
-    intervals.sort_unstable_by(|[a, _], [b, _]| a.total_cmp(b));
+    keep_innermost(&mut intervals);
     if first > f32::from(LARGEST_PART_FIRST) {
         return None;
     }
@@ -224,32 +230,64 @@ fn parts(samples: &[Sample], white: Scale, tolerance: f32) -> Option<Curve> {
     })
 }
 
-/// The steps of all parts, each the longest one that the intervals that begin within it bear.
+/// Leaves only intervals that contain no other: a level in one of these is in all around it. They are sorted then.
+fn keep_innermost(intervals: &mut Vec<[f32; 2]>) {
+    intervals.sort_unstable_by(|[a, _], [b, _]| b.total_cmp(a));
+    let mut least = f32::INFINITY;
+    intervals.retain(|[_, high]| {
+        let is_innermost = *high < least;
+        least = least.min(*high);
+        is_innermost
+    });
+    intervals.reverse();
+}
+
+/// The first parts of a curve.
+#[derive(Clone, Copy)]
+struct Begun {
+    steps: [u8; PARTS / 2],
+    /// The last level, and where the next part begins.
+    last: f32,
+    end: f32,
+}
+
+/// Steps of all parts with which a level falls into every interval. The longest steps of a part come furthest, but others may
+/// suit better what follows: the [`KEPT`] that come furthest are followed up.
 fn steps(intervals: &[[f32; 2]], first: f32, unit: u8) -> Option<[u8; PARTS / 2]> {
-    let mut steps = [0; PARTS / 2];
-    let (mut open, mut begin, mut last) = (intervals, first, first);
+    let mut kept = vec![Begun {
+        steps: [0; PARTS / 2],
+        last: first,
+        end: first,
+    }];
     for part in 0..PARTS {
-        open = &open[open.partition_point(|[low, _]| *low <= begin)..];
-        if open.is_empty() {
-            return Some(steps);
+        let mut next = Vec::new();
+        for begun in kept {
+            let begin = begun.end;
+            let open = &intervals[intervals.partition_point(|[low, _]| *low <= begin)..];
+            if open.is_empty() {
+                return Some(begun.steps);
+            }
+            for (place, step) in (0..).zip(PART_STEPS) {
+                let step = f32::from(step) * f32::from(1_u16 << unit);
+                // Past the last code there is no level.
+                let codes = f32::from(PART_CODES - u16::from(part == PARTS - 1));
+                let last = begin + codes * step;
+                let mut within = open.iter().take_while(|[low, _]| *low <= last);
+                if within.all(|[low, high]| begin + ((low - begin) / step).ceil() * step <= *high) {
+                    let mut steps = begun.steps;
+                    steps[part / 2] |= place << (4 * (part % 2));
+                    let end = begin + f32::from(PART_CODES) * step;
+                    next.push(Begun { steps, last, end });
+                }
+            }
         }
-        let step = |place: u8| f32::from(PART_STEPS[usize::from(place)]) * f32::from(1_u16 << unit);
-        // Past the last code there is no level.
-        let codes = f32::from(PART_CODES - u16::from(part == PARTS - 1));
-        let place = (0..16).rev().find(|place| {
-            let step = step(*place);
-            let end = begin + codes * step;
-            let mut begun = open.iter().take_while(|[low, _]| *low <= end);
-            begun.all(|[low, high]| begin + ((low - begin) / step).ceil() * step <= *high)
-        })?;
-        steps[part / 2] |= if part.is_multiple_of(2) {
-            place
-        } else {
-            place << 4
-        };
-        last = begin + codes * step(place);
-        begin += f32::from(PART_CODES) * step(place);
+        next.sort_by(|a, b| b.end.total_cmp(&a.end));
+        next.truncate(KEPT);
+        kept = next;
     }
-    let is_reached = open.last().is_none_or(|[low, _]| *low <= last);
-    is_reached.then_some(steps)
+    let furthest = kept.first()?;
+    let is_reached = intervals
+        .last()
+        .is_none_or(|[low, _]| *low <= furthest.last);
+    is_reached.then_some(furthest.steps)
 }

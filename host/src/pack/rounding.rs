@@ -13,7 +13,7 @@ use relume::code::{Code, Curve};
 use relume::color::Rgb;
 
 use super::Source;
-use super::bearable::{MORE_SHOWN, Sample, Stage, States};
+use super::bearable::{Sample, Stage, States};
 use crate::display_error::shown_code;
 
 /// Display codes that a sum may be off by when every light takes its nearest level.
@@ -147,11 +147,11 @@ impl Place {
         }
     }
 
-    /// By how many display codes a sum is off when it is overexposed; more is bearable of what is shown.
+    /// By how many display codes a sum is off when it is overexposed.
     fn off(&self, exact: f32, found: f32) -> f32 {
         let [packed, shown] = self.overexposed;
         let codes = |white: f32| (shown_code(exact / white) - shown_code(found / white)).abs();
-        codes(packed).max(codes(shown / self.reflectance) / MORE_SHOWN)
+        codes(packed).max(codes(shown / self.reflectance))
     }
 
     /// With the level on the other side of the value, if that bears it.

@@ -13,10 +13,10 @@ use crate::status::{RelumeStatus, exclusive, holds, shared, status, values};
 #[repr(C)]
 pub struct RelumeAtlas {
     made: u32,
-    words: MaybeUninit<[u64; 28]>,
+    words: MaybeUninit<[u64; 30]>,
 }
 
-holds!(RelumeAtlas, Atlas<'static>, 28);
+holds!(RelumeAtlas, Atlas<'static>, 30);
 
 /// A linear RGB triple.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,7 +7,7 @@ use crate::atlas::{RelumeAtlas, RelumeRgb};
 use crate::status::{RelumeStatus, exclusive, shared, status, values, values_mut};
 
 /// Words of memory for each light of `relume_irradiance`.
-pub const RELUME_LIGHT_WORDS: usize = 20;
+pub const RELUME_LIGHT_WORDS: usize = 24;
 
 const _: () =
     assert!(size_of::<FixedWeight>() <= 4 * RELUME_LIGHT_WORDS && align_of::<FixedWeight>() <= 4);

@@ -1,11 +1,11 @@
 //! The atlas: packed contributions of every light to every element, as bytes that live in flash.
 //!
-//! Version 4, little-endian, no alignment needed. Lengths in bytes, `n` elements, `k` lights:
+//! Version 5, little-endian, no alignment needed. Lengths in bytes, `n` elements, `k` lights:
 //!
 //! | at | what |
 //! | --- | --- |
 //! | 0 | `RELUMEAT` |
-//! | 8 | `u16` version, 4 |
+//! | 8 | `u16` version, 5 |
 //! | 10 | `u8` quantity: 0 irradiance, 1 radiosity (reflectance multiplied in), 2 radiance |
 //! | 11 | three zero bytes |
 //! | 14 | `u16` width of the image whose pixels, row by row, are the elements; 0 for an atlas of no image |
@@ -19,7 +19,8 @@
 //! | 44 | `u32` faces, 0 without a mesh |
 //! | 48 | `f32` largest error of packing, see [`WorstError::packed`]; all ones: not measured |
 //! | 52 | `f32` the same of what is shown, see [`WorstError::shown`] |
-//! | 56 | `k` lights of 64: nominal emission `3 f32`, code `u8` (its place in [`Code::ALL`]), a zero byte, length of the name `u16`, largest error with this light alone `f32` (all ones: not measured), two zero bytes, for red, green and blue a [`Curve`] of 14: mantissa `u16` and exponent `i16` of its scale or white, first `u32`, step `u32`, last code `u16` (what a curve does not have is 0; the scale of a logarithmic one is 1; one of parts has after its white, as `u16`, first and, times 2^12, unit, then the 8 bytes of steps) |
+//! | 56 | `k` lights of 64: nominal emission `3 f32`, code `u8` (its place in [`Code::ALL`]), a zero byte, length of the name `u16`, largest error with this light alone `f32` (all ones: not measured), two zero bytes, for red, green and blue a [`Curve`] of 14: mantissa `u16` and exponent `i16` of its scale or white, first `u32`, step `u32`, last code `u16` (what a curve does not have is 0; the scale of a logarithmic one is 1; one of parts has after its white, as `u16`, first and, times 2^12, unit, then the first 8 of the 16 bytes of steps) |
+//! | | with a light in `display8`, `k` times, for red, green and blue, the other 8 bytes of steps; of other lights they are 0 |
 //! | | the names one after the other, UTF-8 |
 //! | | codes: for every element, for every light that is not in tiles, 3 bytes of red, green and blue, or 1 of luminance |
 //! | | the tiles, see [`Tiles`] |
@@ -48,7 +49,7 @@ pub use tiles::{
 };
 pub use write::{Contents, LightEntry, size, write};
 
-use crate::code::{Code, Curve};
+use crate::code::{Code, Curve, PARTS};
 use crate::color::Rgb;
 use crate::geometry::Polygon;
 use crate::mesh::Side;
@@ -56,7 +57,7 @@ use crate::scene::Emission;
 
 /// How an atlas starts.
 pub const MAGIC: [u8; 8] = *b"RELUMEAT";
-const VERSION: u16 = 4;
+const VERSION: u16 = 5;
 const HEADER_BYTES: usize = 56;
 const CHECKSUM_AT: usize = 20;
 const LIGHT_BYTES: usize = 64;
@@ -65,6 +66,9 @@ const CODE_AT: usize = 12;
 /// Where the curves of a light stand in its record, and how long one is.
 const CURVES_AT: usize = 22;
 const CURVE_BYTES: usize = 14;
+/// The second half of the steps of parts: of a channel, and of a light.
+const STEPS_BYTES: usize = PARTS / 4;
+const LIGHT_STEPS_BYTES: usize = 3 * STEPS_BYTES;
 /// The largest code in tiles: differences of two fit 16 bits.
 pub const LARGEST_TILE_CODE: u16 = i16::MAX as u16;
 const SURFACE_BYTES: usize = 52;
@@ -229,6 +233,7 @@ fn checksum<K: Known>(bytes: &[u8]) -> Option<u32> {
 /// Where the parts lie.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Layout {
+    steps: u64,
     names: u64,
     codes: u64,
     tiles: u64,
@@ -250,10 +255,11 @@ struct CountsOf {
 }
 
 impl CountsOf {
-    /// Offsets in `u64`, with so many bytes of codes per element; `None` when even those overflow.
-    fn layout(&self, stride: u64) -> Option<Layout> {
+    /// Offsets in `u64`, with so many bytes of codes per element, and of steps per light; `None` when even those overflow.
+    fn layout(&self, stride: u64, steps: usize) -> Option<Layout> {
         let [n, k] = [u64::from(self.elements), u64::from(self.lights)];
-        let names = HEADER_BYTES as u64 + k * LIGHT_BYTES as u64;
+        let begin = HEADER_BYTES as u64 + k * LIGHT_BYTES as u64;
+        let names = begin + k * steps as u64;
         let codes = names + u64::from(self.names);
         let tiles = codes.checked_add(n.checked_mul(stride)?)?;
         let surfaces = tiles.checked_add(self.tiles.into())?;
@@ -261,6 +267,7 @@ impl CountsOf {
         let elements = faces.checked_add(u64::from(self.faces) * FACE_BYTES as u64)?;
         let stored = if self.faces > 0 { n } else { 0 };
         Some(Layout {
+            steps: begin,
             names,
             codes,
             tiles,

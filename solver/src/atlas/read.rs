@@ -9,8 +9,9 @@ use glam::{Vec2, Vec3};
 use super::tiles::Tiles;
 use super::{
     AtlasElement, AtlasError, AtlasFace, AtlasLight, CHECKSUM_AT, CODE_AT, CURVE_BYTES, CURVES_AT,
-    CountsOf, ELEMENT_BYTES, FACE_BYTES, HEADER_BYTES, LARGEST_TILE_CODE, LIGHT_BYTES, MAGIC,
-    NO_LIGHT, NOT_MEASURED, Quantity, SURFACE_BYTES, VERSION, WorstError, checksum,
+    CountsOf, ELEMENT_BYTES, FACE_BYTES, HEADER_BYTES, LARGEST_TILE_CODE, LIGHT_BYTES,
+    LIGHT_STEPS_BYTES, MAGIC, NO_LIGHT, NOT_MEASURED, Quantity, STEPS_BYTES, SURFACE_BYTES,
+    VERSION, WorstError, checksum,
 };
 use crate::code::{
     AllCodes, Code, Curve, ExponentialCodes, Known, LARGEST_PART_FIRST, LARGEST_PART_UNIT, Scale,
@@ -29,6 +30,8 @@ pub struct Atlas<'a> {
     counts: CountsOf,
     worst_error: Option<WorstError>,
     lights: &'a [u8],
+    /// What follows the records of lights if one is in `display8`.
+    steps: &'a [u8],
     names: &'a str,
     /// Bytes of codes per element.
     stride: usize,
@@ -43,11 +46,12 @@ impl<'a> Atlas<'a> {
     /// # Errors
     /// [`AtlasError`]: what is wrong with the bytes.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, AtlasError> {
-        let (atlas, mesh) = Self::parse_parts::<AllCodes>(bytes)?;
-        if let Some(mesh) = mesh {
+        let mut atlas = Self::parse_codes(bytes)?;
+        atlas.mesh = atlas.mesh_at_end(bytes);
+        if let Some(mesh) = &atlas.mesh {
             mesh.check(atlas.counts.lights)?;
         }
-        Ok(Self { mesh, ..atlas })
+        Ok(atlas)
     }
 
     /// The same without the mesh, which is left unread: this takes no float arithmetic.
@@ -55,7 +59,7 @@ impl<'a> Atlas<'a> {
     /// # Errors
     /// [`AtlasError`]: what is wrong with the bytes before the mesh, or with all of them by their checksum.
     pub fn parse_codes(bytes: &'a [u8]) -> Result<Self, AtlasError> {
-        Ok(Self::parse_parts::<AllCodes>(bytes)?.0)
+        Self::parse_as::<AllCodes>(bytes)
     }
 
     /// The same for an atlas in exponential codes only, by a reader that knows no others
@@ -65,7 +69,7 @@ impl<'a> Atlas<'a> {
     /// [`AtlasError`], as above, and for lights in other codes.
     #[inline(never)]
     pub fn parse_exponential(bytes: &'a [u8]) -> Result<Self, AtlasError> {
-        Ok(Self::parse_parts::<ExponentialCodes>(bytes)?.0)
+        Self::parse_as::<ExponentialCodes>(bytes)
     }
 
     /// The same for an atlas that was found legal when it had this checksum: only the checksum is looked at again.
@@ -95,6 +99,7 @@ impl<'a> Atlas<'a> {
             counts,
             worst_error: header.worst_error,
             lights,
+            steps: &[],
             names: "",
             stride,
             codes: codes.get(..length).unwrap_or_default(),
@@ -103,8 +108,8 @@ impl<'a> Atlas<'a> {
         })
     }
 
-    /// The atlas without its mesh, and the mesh, not checked yet.
-    fn parse_parts<K: Known>(bytes: &'a [u8]) -> Result<(Self, Option<AtlasMesh<'a>>), AtlasError> {
+    /// The atlas without its mesh.
+    fn parse_as<K: Known>(bytes: &'a [u8]) -> Result<Self, AtlasError> {
         let header = Header::parse(bytes)?;
         let counts = header.counts;
         // Else any number of elements would fit into a file of no size.
@@ -116,15 +121,18 @@ impl<'a> Atlas<'a> {
             return Err(AtlasError::Truncated { needed: lights });
         }
         let lights = bytes.get(HEADER_BYTES..lights as usize).unwrap_or_default();
-        let (mut stride, mut is_tiled) = (0, false);
+        let (mut stride, mut is_tiled, mut steps) = (0, false, 0);
         for tag in 0..counts.lights {
             let code = code_at(lights, tag).filter(|code| K::knows(*code));
             let code = code.ok_or(AtlasError::Illegal("code"))?;
             stride += code.bytes();
             is_tiled |= code.is_tiled();
+            if !K::ONLY_EXPONENTIAL && code == Code::Display8 {
+                steps = LIGHT_STEPS_BYTES;
+            }
         }
         let needed = counts
-            .layout(stride as u64)
+            .layout(stride as u64, steps)
             .ok_or(AtlasError::Illegal("size"))?;
         if needed.end != u64::from(header.length) {
             return Err(AtlasError::Illegal("length"));
@@ -165,6 +173,7 @@ impl<'a> Atlas<'a> {
             counts,
             worst_error: header.worst_error,
             lights,
+            steps: part(needed.steps, needed.names),
             names: names.map_err(|_| AtlasError::Illegal("light name"))?,
             stride,
             codes: part(needed.codes, needed.tiles),
@@ -172,24 +181,47 @@ impl<'a> Atlas<'a> {
             mesh: None,
         };
         atlas.check_lights::<K>()?;
-        let mesh = (!K::ONLY_EXPONENTIAL && counts.faces > 0).then(|| AtlasMesh {
-            surfaces: part(needed.surfaces, needed.faces),
-            faces: part(needed.faces, needed.elements),
-            elements: part(needed.elements, needed.end),
-        });
-        Ok((atlas, mesh))
+        Ok(atlas)
+    }
+
+    /// The mesh that ends the bytes of this atlas, not checked yet.
+    fn mesh_at_end(&self, bytes: &'a [u8]) -> Option<AtlasMesh<'a>> {
+        let CountsOf {
+            elements,
+            surfaces,
+            faces,
+            ..
+        } = self.counts;
+        let mut rest = bytes;
+        let mut last = |count: u32, bytes: usize| {
+            let begin = rest
+                .len()
+                .checked_sub((count as usize).checked_mul(bytes)?)?;
+            let (before, table) = rest.split_at_checked(begin)?;
+            rest = before;
+            Some(table)
+        };
+        (faces > 0).then_some(())?;
+        let elements = last(elements, ELEMENT_BYTES)?;
+        let faces = last(faces, FACE_BYTES)?;
+        let surfaces = last(surfaces, SURFACE_BYTES)?;
+        Some(AtlasMesh {
+            surfaces,
+            faces,
+            elements,
+        })
     }
 
     fn check_lights<K: Known>(&self) -> Result<(), AtlasError> {
         let mut named = 0_usize;
         for tag in 0..self.counts.lights {
-            let record = LightRecord::parse(record(self.lights, tag, LIGHT_BYTES));
-            let reaches = |record: &LightRecord| {
-                let mut curves = record.curves.iter().zip(record.last);
-                curves.all(|(curve, last)| curve.reaches::<K>(last))
+            let reaches = |channel| {
+                let curve = self.curve(tag, channel);
+                curve.is_some_and(|(curve, last)| curve.reaches::<K>(last))
             };
-            let record = record.filter(reaches);
-            let record = record.ok_or(AtlasError::Illegal("light"))?;
+            let Some(record) = self.light(tag).filter(|_| (0..3).all(reaches)) else {
+                return Err(AtlasError::Illegal("light"));
+            };
             if record.error.is_some() != self.worst_error.is_some() {
                 return Err(AtlasError::Illegal("error of a light"));
             }
@@ -245,9 +277,11 @@ impl<'a> Atlas<'a> {
 
     /// The lights, in the order of their tags.
     pub fn lights(&self) -> impl Iterator<Item = AtlasLight<'a>> + use<'a> {
-        let (lights, mut names) = (self.lights, self.names);
+        let (atlas, mut names) = (*self, self.names);
         (0..self.counts.lights).filter_map(move |tag| {
-            let record = LightRecord::parse(record(lights, tag, LIGHT_BYTES))?;
+            let record = atlas.light(tag)?;
+            let curve = |channel| atlas.curve(tag, channel);
+            let ((r, last_r), (g, last_g), (b, last_b)) = (curve(0)?, curve(1)?, curve(2)?);
             let named = names.split_at_checked(usize::from(record.name_length));
             let (name, rest) = named.unwrap_or_default();
             names = rest;
@@ -255,8 +289,8 @@ impl<'a> Atlas<'a> {
                 name,
                 emission: record.emission,
                 code: record.code,
-                curves: record.curves,
-                last: record.last,
+                curves: [r, g, b],
+                last: [last_r, last_g, last_b],
                 error: record.error,
             })
         })
@@ -268,11 +302,14 @@ impl<'a> Atlas<'a> {
         code_at(self.lights, light)
     }
 
-    /// What the codes of a light stand for, and the largest of each channel; `None` without such a light.
+    /// What the codes of a channel of a light stand for, and the largest of them; `None` without such a light or channel.
     #[must_use]
-    pub fn curves(&self, light: u32) -> Option<([Curve; 3], [u16; 3])> {
-        let record = LightRecord::parse(record(self.lights, light, LIGHT_BYTES))?;
-        Some((record.curves, record.last))
+    pub fn curve(&self, light: u32, channel: usize) -> Option<(Curve, u16)> {
+        let curves = record(self.lights, light, LIGHT_BYTES).get(CURVES_AT..)?;
+        let steps = record(self.steps, light, LIGHT_STEPS_BYTES);
+        let more = steps.as_chunks::<STEPS_BYTES>().0.get(channel);
+        let own = curves.as_chunks::<CURVE_BYTES>().0.get(channel)?;
+        parse_curve(self.code(light)?, own, more.copied().unwrap_or_default())
     }
 
     /// One more than the largest code of any light.
@@ -407,6 +444,10 @@ impl<'a> Atlas<'a> {
     /// Whether all lights are in codes for which `f` holds; looks at nothing else of them.
     pub fn is_all_in(&self, f: impl Fn(Code) -> bool) -> bool {
         self.records().all(|record| code_of(record).is_some_and(&f))
+    }
+
+    fn light(&self, tag: u32) -> Option<LightRecord> {
+        LightRecord::parse(record(self.lights, tag, LIGHT_BYTES))
     }
 
     fn records(&self) -> impl Iterator<Item = &'a [u8; LIGHT_BYTES]> + use<'a> {
@@ -622,8 +663,6 @@ struct LightRecord {
     code: Code,
     name_length: u16,
     error: Option<f32>,
-    curves: [Curve; 3],
-    last: [u16; 3],
 }
 
 impl LightRecord {
@@ -637,24 +676,23 @@ impl LightRecord {
         let name_length = input.u16()?;
         let error = error(input.u32()?)?;
         input.u16().filter(|reserved| *reserved == 0)?;
-        let ((r, last_r), (g, last_g), (b, last_b)) = (
-            curve(code, &mut input)?,
-            curve(code, &mut input)?,
-            curve(code, &mut input)?,
-        );
         Some(Self {
             emission,
             code,
             name_length,
             error,
-            curves: [r, g, b],
-            last: [last_r, last_g, last_b],
         })
     }
 }
 
-/// A curve and its last code.
-fn curve(code: Code, input: &mut Input) -> Option<(Curve, u16)> {
+/// A curve and its last code; `more` is the second half of its steps, if it has any.
+#[inline(never)]
+fn parse_curve(
+    code: Code,
+    bytes: &[u8; CURVE_BYTES],
+    more: [u8; STEPS_BYTES],
+) -> Option<(Curve, u16)> {
+    let mut input = Input(bytes);
     let scale = Scale::from_parts(input.u16()?, i16::from_le_bytes(input.take()?))?;
     if code == Code::Display8 {
         let head = input.u16()?;
@@ -663,9 +701,12 @@ fn curve(code: Code, input: &mut Input) -> Option<(Curve, u16)> {
             white: scale,
             first,
             unit,
-            steps: input.take()?,
+            steps: *[input.take()?, more].as_flattened().first_chunk()?,
         };
         return (unit <= LARGEST_PART_UNIT).then_some((curve, u8::MAX.into()));
+    }
+    if more != [0; STEPS_BYTES] {
+        return None;
     }
     let (first, step, last) = (input.u32()?, input.u32()?, input.u16()?);
     let curve = match code {

@@ -180,6 +180,34 @@ fn what_was_written_is_read() {
 }
 
 #[test]
+fn all_steps_are_read_where_they_were_written() {
+    let lights = [0, 1].map(|tag| {
+        let entry = lights()[1];
+        let curves = [0, 1, 2].map(|channel| Curve::Parts {
+            white: Scale::ONE,
+            first: 7,
+            unit: 5,
+            steps: core::array::from_fn(|place| (100 * tag + 30 * channel + place) as u8),
+        });
+        LightEntry { curves, ..entry }
+    });
+    let contents = Contents {
+        quantity: Quantity::Irradiance,
+        lights: &lights,
+        elements: 8,
+        image_width: 0,
+        errors: None,
+        tiles: &[],
+        mesh: None,
+    };
+    let mut bytes = vec![0; size(&contents).unwrap()];
+    write(&contents, value, &mut bytes).unwrap();
+    let atlas = Atlas::parse(&bytes).unwrap();
+    let read: Vec<_> = atlas.lights().map(|light| light.curves).collect();
+    assert_eq!(read, lights.map(|light| light.curves));
+}
+
+#[test]
 fn every_truncation_is_an_error() {
     let bytes = sample();
     for length in 0..bytes.len() {
@@ -224,9 +252,11 @@ fn resign(bytes: &mut [u8]) {
 #[test]
 fn what_the_format_does_not_allow_is_an_error() {
     let sound = sample();
-    let names = "ceilingLämpchengreyin tiles".len();
     let lights = |tag: usize| 56 + tag * 64;
-    let tiles = lights(4) + names + 8 * (3 + 3 + 1);
+    let steps = |tag: usize| lights(4) + tag * 24;
+    let names = steps(4);
+    let codes = names + "ceilingLämpchengreyin tiles".len();
+    let tiles = codes + 8 * (3 + 3 + 1);
     let surfaces = tiles + TILES.len();
     let faces = surfaces + 2 * 52;
     let elements = faces + 3 * 24;
@@ -246,7 +276,7 @@ fn what_the_format_does_not_allow_is_an_error() {
         (48, &[0xff; 8], "error of a light"),
         (lights(0), &minus, "light"),
         (lights(0) + 12, &[9], "code"),
-        (lights(1) + 12, &[1], "light"),
+        (lights(1) + 12, &[1], "length"),
         (lights(0) + 13, &[1], "light"),
         (lights(0) + 14, &[0], "light name"),
         (lights(0) + 16, &nan, "light"),
@@ -260,7 +290,9 @@ fn what_the_format_does_not_allow_is_an_error() {
         (lights(3) + 30, &[0; 4], "light"),
         (lights(3) + 35, &[0x80], "light"),
         (lights(3) + 30, &[0xff; 4], "light"),
-        (lights(4), &[0xff], "light name"),
+        (steps(0), &[1], "light"),
+        (steps(3) + 23, &[1], "light"),
+        (names, &[0xff], "light name"),
         (tiles, &[0], "table of tiles"),
         (tiles, &[17], "table of tiles"),
         (tiles + 1, &[0], "table of tiles"),

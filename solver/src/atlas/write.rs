@@ -1,10 +1,10 @@
 //! Writes an atlas into the caller's slice.
 
 use super::{
-    AtlasError, CHECKSUM_AT, CountsOf, HEADER_BYTES, LARGEST_TILE_CODE, MAGIC, NO_LIGHT,
-    NOT_MEASURED, Quantity, VERSION, WorstError, checksum,
+    AtlasError, CHECKSUM_AT, CountsOf, HEADER_BYTES, LARGEST_TILE_CODE, LIGHT_STEPS_BYTES, MAGIC,
+    NO_LIGHT, NOT_MEASURED, Quantity, STEPS_BYTES, VERSION, WorstError, checksum,
 };
-use crate::code::{AllCodes, Code, Curve, LARGEST_PART_FIRST, LARGEST_PART_UNIT, Scale};
+use crate::code::{AllCodes, Code, Curve, LARGEST_PART_FIRST, LARGEST_PART_UNIT, PARTS, Scale};
 use crate::color::Rgb;
 use crate::geometry::Polygon;
 use crate::mesh::{Mesh, Side};
@@ -59,6 +59,15 @@ pub struct Contents<'a> {
 }
 
 impl Contents<'_> {
+    /// Bytes of steps per light, behind the records of all.
+    fn steps(&self) -> usize {
+        if self.lights.iter().any(|l| l.code == Code::Display8) {
+            LIGHT_STEPS_BYTES
+        } else {
+            0
+        }
+    }
+
     fn counts(&self) -> Result<CountsOf, AtlasError> {
         let count = |n: usize, what| u32::try_from(n).map_err(|_| AtlasError::Unfit(what));
         let names = self.lights.iter().map(|light| light.name.len()).sum();
@@ -102,7 +111,7 @@ impl Contents<'_> {
 /// [`AtlasError::Unfit`] for counts that the format cannot hold.
 pub fn size(contents: &Contents) -> Result<usize, AtlasError> {
     let stride = contents.lights.iter().map(|l| l.code.bytes() as u64);
-    let layout = contents.counts()?.layout(stride.sum());
+    let layout = contents.counts()?.layout(stride.sum(), contents.steps());
     layout
         .filter(|layout| layout.end <= u64::from(u32::MAX))
         .and_then(|layout| usize::try_from(layout.end).ok())
@@ -230,6 +239,12 @@ fn lights(contents: &Contents, output: &mut Output) -> Result<(), AtlasError> {
             put_curve(light.code, *curve, last, output)?;
         }
     }
+    if contents.steps() > 0 {
+        let curves = lights.iter().flat_map(|light| &light.curves);
+        curves
+            .map(|curve| halves(curve).1)
+            .try_for_each(|steps| output.put(&steps))?;
+    }
     lights
         .iter()
         .try_for_each(|light| output.put(light.name.as_bytes()))
@@ -255,17 +270,25 @@ fn put_curve(code: Code, curve: Curve, last: u16, output: &mut Output) -> Result
     }
     output.put(&scale.mantissa().to_le_bytes())?;
     output.put(&scale.exponent().to_le_bytes())?;
-    if let Curve::Parts {
-        first, unit, steps, ..
-    } = curve
-    {
+    if let Curve::Parts { first, unit, .. } = curve {
         let head = first.min(LARGEST_PART_FIRST) | u16::from(unit.min(LARGEST_PART_UNIT)) << 12;
         output.put(&head.to_le_bytes())?;
-        return output.put(&steps);
+        return output.put(&halves(&curve).0);
     }
     output.u32(first)?;
     output.u32(step)?;
     output.put(&last.to_le_bytes())
+}
+
+/// Both halves of the steps of a curve, which are 0 if it has none.
+fn halves(curve: &Curve) -> ([u8; STEPS_BYTES], [u8; STEPS_BYTES]) {
+    let steps = match curve {
+        Curve::Parts { steps, .. } => *steps,
+        _ => [0; PARTS / 2],
+    };
+    let (first, second) = steps.split_at(STEPS_BYTES);
+    let half = |steps: &[u8]| steps.first_chunk().copied().unwrap_or_default();
+    (half(first), half(second))
 }
 
 fn mesh_parts(surfaces: &[Polygon], mesh: Mesh, output: &mut Output) -> Result<(), AtlasError> {

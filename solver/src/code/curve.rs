@@ -6,7 +6,7 @@
 //!   `f(C) = e^((C - 255) / K)` above, `K = 255 * 1.055 / 2.4 = 112.09`, which continues it with the
 //!   same slope. `f` is *defined* by two tables, linear in between, so that a decoder needs no float: it is within
 //!   7e-4 of the formula, relative to the value (the largest distance is at `C = 11`).
-//! * Parts: the same `f`, but every 16 codes have a step of their own, [`PART_STEPS`]`[n] 2^unit`, `n` in four bits.
+//! * Parts: the same `f`, but every 8 codes have a step of their own, [`PART_STEPS`]`[n] 2^unit`, `n` in four bits.
 //! * Logarithmic: `x = 0` for code 0, else `x = 2^((first + c - 1) / N - 200)`, `N = 42` steps an
 //!   octave, so that every positive float has a code.
 //!
@@ -38,10 +38,10 @@ const LOG_BEGIN: i32 = -200;
 const UNITS: u32 = 1 << 12;
 
 /// Parts of a curve of 256 codes.
-pub const PARTS: usize = 16;
+pub const PARTS: usize = 32;
 
 /// Codes of a part.
-pub const PART_CODES: u16 = 16;
+pub const PART_CODES: u16 = 8;
 
 /// Steps that a part can have, times `2^unit`, in 2^-12 display codes: `256 * 2^(n / 7)`.
 pub const PART_STEPS: [u16; 16] = [
@@ -95,7 +95,7 @@ pub enum Curve {
         /// From a code to the next, in 2^-12 display codes; at least 1.
         step: u32,
     },
-    /// Uniform in display codes within each of 16 parts.
+    /// Uniform in display codes within each of 32 parts.
     Parts {
         /// The value at 255 display codes.
         white: Scale,
@@ -166,7 +166,8 @@ impl Curve {
                 ref steps,
                 ..
             } => {
-                let (part, within) = (byte(code) >> 4, byte(code) & 15);
+                let code = u16::from(byte(code));
+                let (part, within) = (code / PART_CODES, code % PART_CODES);
                 let pairs = usize::from(part / 2);
                 let both = |pair: &u8| part_step(pair & 15) + part_step(pair >> 4);
                 let mut before: u32 = steps.iter().take(pairs).map(both).sum();
@@ -234,6 +235,27 @@ impl Curve {
         }
     }
 
+    /// [`Self::magnitude`] of the codes of a byte, from 0 on. Display curves are walked along, which takes less than to begin anew with each code.
+    pub fn magnitudes(&self) -> impl Iterator<Item = Magnitude> {
+        let mut units = self.units(0);
+        (0..=u8::MAX).map(move |code| {
+            let step = match self {
+                Self::Display { step, .. } => *step,
+                Self::Parts { unit, steps, .. } => {
+                    let part = u16::from(code) / PART_CODES;
+                    let pair = steps.get(usize::from(part / 2)).copied().unwrap_or(0);
+                    part_step(pair >> (part % 2 * 4) & 15) << (*unit).min(LARGEST_PART_UNIT)
+                }
+                Self::Exponential { .. } | Self::Logarithmic { .. } => {
+                    return self.magnitude(code.into());
+                }
+            };
+            let magnitude = display_magnitude(units);
+            units = units.saturating_add(step);
+            magnitude
+        })
+    }
+
     /// Whether a code has a value below 2^127, and so has its [`Self::magnitude`]; without floats.
     #[must_use]
     pub fn reaches<K: Known>(&self, code: u16) -> bool {
@@ -277,7 +299,7 @@ impl Curve {
                 units -= f32::from(first) * (UNITS / 16) as f32;
                 let places = steps.iter().flat_map(|pair| [pair & 15, pair >> 4]);
                 let mut guess = 0.0;
-                for (place, begin) in places.zip((0_u8..).step_by(PARTS)) {
+                for (place, begin) in places.zip((0_u16..).step_by(PART_CODES.into())) {
                     let step = (part_step(place) << unit.min(LARGEST_PART_UNIT)) as f32;
                     guess = f32::from(begin) + units / step;
                     units -= f32::from(PART_CODES) * step;
@@ -462,6 +484,35 @@ mod tests {
                 (found / exact - 1.0).abs() < 3.8e-6,
                 "{code}: {found} {exact}"
             );
+        }
+    }
+
+    #[test]
+    fn a_walk_along_a_curve_meets_what_each_code_has() {
+        let white = Scale::ONE;
+        let parts = |unit, steps| Curve::Parts {
+            white,
+            first: 77,
+            unit,
+            steps,
+        };
+        let curves = [
+            Curve::Exponential { scale: white },
+            Curve::display(white, 1.7).unwrap(),
+            // Its units do not fit 32 bits.
+            Curve::display(white, 60_000.0).unwrap(),
+            Curve::logarithmic(1e-5).unwrap(),
+            parts(0, [0x10; PARTS / 2]),
+            parts(
+                LARGEST_PART_UNIT,
+                core::array::from_fn(|pair| (pair * 83 % 256) as u8),
+            ),
+        ];
+        for curve in curves {
+            assert_eq!(curve.magnitudes().count(), 256);
+            for (code, magnitude) in (0..).zip(curve.magnitudes()) {
+                assert_eq!(magnitude, curve.magnitude(code), "{curve:?} {code}");
+            }
         }
     }
 

@@ -42,7 +42,7 @@ pub enum Code {
     Exp8,
     /// Exponential with one scale per light, which puts its largest value on code 254.
     Exp8s,
-    /// Display steps up to a white of each light and channel, logarithmic ones above; 16 parts have steps of their own.
+    /// Display steps up to a white of each light and channel, logarithmic ones above; 32 parts have steps of their own.
     Display8,
     /// One exponential code for the luminance; the colour is that of the light alone.
     Lum8,

@@ -17,7 +17,7 @@ use core::f32::consts::FRAC_1_PI;
 use super::{RelightError, Wide, check_lights};
 use crate::atlas::{Atlas, LARGEST_SIDE, Tiles};
 use crate::code::{
-    AllCodes, Code, Curve, DECODED, DECODED_BITS, ExponentialCodes, Known, Magnitude, Scale,
+    AllCodes, Code, Curve, DECODED, DECODED_BITS, ExponentialCodes, Known, Magnitude,
 };
 use crate::color::Rgb;
 
@@ -132,7 +132,13 @@ pub struct Values {
 }
 
 impl Values {
-    pub(super) fn new<K: Known>(curve: Curve, last: u16) -> Self {
+    /// Those of the codes of a channel of a light.
+    pub(super) fn of_light<K: Known>(atlas: &Atlas, light: u32, channel: usize) -> Option<Self> {
+        let (curve, last) = atlas.curve(light, channel)?;
+        Some(Self::new::<K>(curve, last))
+    }
+
+    fn new<K: Known>(curve: Curve, last: u16) -> Self {
         let exponent = if K::ONLY_EXPONENTIAL {
             EXPONENTIAL
         } else {
@@ -144,6 +150,13 @@ impl Values {
             last,
             exponent,
         }
+    }
+
+    /// What 2^-`exponent` of a value is worth at full weight, W/m2.
+    fn unit(&self, full: f32) -> Wide {
+        let scale = self.curve.scale();
+        let scale = Wide::new(scale.mantissa().into(), scale.exponent().into());
+        Wide::from_float(full).times(scale).scaled(self.exponent)
     }
 
     /// Calls `f` with one entry and value after the other, from code 0 on.
@@ -159,15 +172,20 @@ impl Values {
                 f(entry, u32::from(*value));
             }
         } else {
-            for (entry, code) in entries.zip(0..) {
-                f(entry, self.of::<K>(code));
+            for (entry, value) in entries.zip(self.curve.magnitudes()) {
+                f(entry, self.shifted::<K>(value));
             }
         }
     }
 
     /// Below 2^16.
     pub(super) fn of<K: Known>(&self, code: u16) -> u32 {
-        let value = K::magnitude(&self.curve, code.min(self.last));
+        self.shifted::<K>(K::magnitude(&self.curve, code.min(self.last)))
+    }
+
+    /// A value of the curve in 16 bits.
+    #[inline(always)]
+    fn shifted<K: Known>(&self, value: Magnitude) -> u32 {
         let shift = if K::ONLY_EXPONENTIAL {
             0
         } else {
@@ -304,16 +322,12 @@ impl<'a> FrameMix<'a> {
     ) {
         let entries = self.lights.iter_mut().zip(full).zip(0..);
         for ((entry, full), light) in entries {
-            let Some((curves, last)) = atlas.curves(light) else {
-                continue;
-            };
-            let values = curves.iter().zip(last);
             let channels = entry.gains.iter_mut().zip(&mut self.full_scale);
-            for (((gain, scale), full), (curve, last)) in channels.zip(full.to_array()).zip(values)
-            {
-                let values = Values::new::<K>(*curve, last);
-                let largest = Wide::new(values.of::<K>(last).into(), 0);
-                f(gain, scale, unit(full, curve.scale(), &values), largest);
+            for (((gain, scale), full), channel) in channels.zip(full.to_array()).zip(0..) {
+                if let Some(values) = Values::of_light::<K>(atlas, light, channel) {
+                    let largest = Wide::new(values.of::<K>(values.last).into(), 0);
+                    f(gain, scale, values.unit(full), largest);
+                }
             }
         }
     }
@@ -338,14 +352,18 @@ impl<'a> FrameMix<'a> {
         for (place, mut bits) in tiles.iter() {
             let mut sums = [[0; 3]; LARGEST_SIDE * LARGEST_SIDE];
             for light in atlas.lights_in_tiles() {
-                let found = self.lights.get(light as usize).zip(atlas.curves(light));
-                if let Some((entry, curves)) = found
+                let entry = self.lights.get(light as usize);
+                let term = |channel| entry?.full_term::<K>(atlas, light, channel);
+                let terms = term(0).zip(term(1)).zip(term(2));
+                if let Some(((r, g), b)) = terms
                     && bits.next_light(place)
                 {
-                    let terms = entry.full_terms::<K>(curves);
-                    for (sums, codes) in sums.iter_mut().zip(bits.codes(curves.1)).take(place.len())
-                    {
-                        add_terms::<K>(sums, &terms, codes);
+                    let terms = [r, g, b];
+                    let last = terms.each_ref().map(|term| term.values.last);
+                    for (sums, codes) in sums.iter_mut().zip(bits.codes(last)).take(place.len()) {
+                        for ((sum, term), code) in sums.iter_mut().zip(&terms).zip(codes) {
+                            *sum += term.of::<K>(code);
+                        }
                     }
                 }
             }
@@ -364,23 +382,28 @@ impl<'a> FrameMix<'a> {
             let mut sums = [[0; 3]; CHUNK];
             let mut begin = 0;
             for (entry, light) in self.lights.iter().zip(0..) {
-                let found = atlas.code(light).zip(atlas.curves(light));
-                let Some((code, curves)) = found.filter(|(code, _)| !code.is_tiled()) else {
+                let code = atlas.code(light).filter(|code| !code.is_tiled());
+                let Some(bytes) = code.map(Code::bytes) else {
                     continue;
                 };
-                let terms = entry.full_terms::<K>(curves);
-                let mut at = begin;
-                for sums in &mut sums {
-                    match (code.bytes(), rows.get(at..)) {
-                        (3, Some(&[r, g, b, ..])) => add_terms::<K>(sums, &terms, [r, g, b]),
-                        (_, Some(&[luminance, ..])) => {
-                            add_terms::<K>(sums, &terms, [luminance; 3]);
-                        }
-                        _ => {}
+                for channel in 0..3 {
+                    let Some(term) = entry.full_term::<K>(atlas, light, channel) else {
+                        continue;
+                    };
+                    // One byte stands for all channels.
+                    let codes = rows
+                        .get(begin + channel.min(bytes - 1)..)
+                        .unwrap_or_default();
+                    let codes = codes.iter().step_by(stride.max(1));
+                    for (sum, code) in sums
+                        .iter_mut()
+                        .filter_map(|sum| sum.get_mut(channel))
+                        .zip(codes)
+                    {
+                        *sum += term.of::<K>((*code).into());
                     }
-                    at += stride;
                 }
-                begin += code.bytes();
+                begin += bytes;
             }
             keep_largest(&mut brightest, &sums);
             rows = rows.get(CHUNK * stride..).unwrap_or_default();
@@ -438,26 +461,17 @@ impl<'a> FrameMix<'a> {
     }
 }
 
-/// The values of a light's codes, by channel.
-pub(super) fn values<K: Known>(atlas: &Atlas, light: u32) -> Result<[Values; 3], RelightError> {
-    let expected = atlas.light_count();
-    let curves = atlas.curves(light);
-    Ok(values_of::<K>(
-        curves.ok_or(RelightError::Lights { expected })?,
-    ))
+/// What the codes of a channel of a light contribute.
+struct Term {
+    weight: Weight,
+    values: Values,
 }
 
-fn values_of<K: Known>((curves, last): ([Curve; 3], [u16; 3])) -> [Values; 3] {
-    let ([r, g, b], [last_r, last_g, last_b]) = (curves, last);
-    [
-        Values::new::<K>(r, last_r),
-        Values::new::<K>(g, last_g),
-        Values::new::<K>(b, last_b),
-    ]
+impl Term {
+    fn of<K: Known>(&self, code: u16) -> u32 {
+        self.weight.of(self.values.of::<K>(code))
+    }
 }
-
-/// What the codes of a light contribute.
-type Terms = ([Weight; 3], [Values; 3]);
 
 impl FrameLight {
     /// What multiplies the values of the codes.
@@ -472,20 +486,12 @@ impl FrameLight {
     }
 
     /// At the full weight, in 2^-16 of the full scale.
-    fn full_terms<K: Known>(&self, curves: ([Curve; 3], [u16; 3])) -> Terms {
-        let full = Self {
-            levels: [u16::MAX; 3],
-            ..*self
-        };
-        (full.weights([BITS as u32; 3]), values_of::<K>(curves))
-    }
-}
-
-/// Adds what the codes of a light contribute.
-fn add_terms<K: Known>(sums: &mut [u32; 3], (weights, values): &Terms, codes: [impl Into<u16>; 3]) {
-    let terms = weights.iter().zip(values);
-    for ((sum, (weight, values)), code) in sums.iter_mut().zip(terms).zip(codes) {
-        *sum += weight.of(values.of::<K>(code.into()));
+    fn full_term<K: Known>(&self, atlas: &Atlas, light: u32, channel: usize) -> Option<Term> {
+        let gain = self.gains.get(channel)?;
+        Some(Term {
+            weight: gain.weight(u16::MAX, BITS as u32),
+            values: Values::of_light::<K>(atlas, light, channel)?,
+        })
     }
 }
 
@@ -495,12 +501,6 @@ fn keep_largest(largest: &mut [u32; 3], sums: &[[u32; 3]]) {
             *largest = (*largest).max(*sum);
         }
     }
-}
-
-/// What 2^-`exponent` of a value is worth at full weight, W/m2.
-fn unit(full: f32, scale: Scale, values: &Values) -> Wide {
-    let scale = Wide::new(scale.mantissa().into(), scale.exponent().into());
-    Wide::from_float(full).times(scale).scaled(values.exponent)
 }
 
 /// Elements that follow each other and reflect alike.

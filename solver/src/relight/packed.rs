@@ -18,7 +18,7 @@ use core::fmt;
 use core::hint::black_box;
 use core::mem;
 
-use super::frame::{Encode, Finish, FrameLight, FrameMix, Weight, values};
+use super::frame::{Encode, Finish, FrameLight, FrameMix, Values, Weight};
 use super::{CodeTable, RelightError, check_elements};
 use crate::atlas::{Atlas, AtlasError};
 use crate::code::{AllCodes, Code, DECODED, ExponentialCodes, Known};
@@ -208,9 +208,11 @@ impl Form for Colour {
         before: Option<[Weight; 3]>,
         after: [Weight; 3],
     ) -> Result<(), RelightError> {
-        let values = values::<Self::Known>(atlas, light)?;
         let weights = before.unwrap_or([Weight::ZERO; 3]).into_iter().zip(after);
-        for ((table, values), (before, after)) in tables.iter_mut().zip(&values).zip(weights) {
+        for ((table, channel), (before, after)) in tables.iter_mut().zip(0..).zip(weights) {
+            let values = Values::of_light::<Self::Known>(atlas, light, channel);
+            let expected = atlas.light_count();
+            let values = values.ok_or(RelightError::Lights { expected })?;
             values.with_codes::<Self::Known, _>(table.iter_mut(), |entry, value| {
                 *entry = after.of(value).wrapping_sub(before.of(value)) as u16;
             });
@@ -607,12 +609,11 @@ impl<'a> AnyTable<'a> {
         mix: &FrameMix,
         light: u32,
     ) -> Result<(), RelightError> {
-        let (weights, values) = (
-            mix.weights(light, [SINGLE; 3])?,
-            values::<AllCodes>(atlas, light)?,
-        );
+        let weights = mix.weights(light, [SINGLE; 3])?;
+        let values = [0, 1, 2].map(|channel| Values::of_light::<AllCodes>(atlas, light, channel));
         self.0.fill(light, |channel, code| {
-            let term = weights.get(channel).zip(values.get(channel));
+            let values = values.get(channel).and_then(Option::as_ref);
+            let term = weights.get(channel).zip(values);
             // Below the full scale.
             term.map_or(0, |(weight, values)| {
                 weight.of(values.of::<AllCodes>(code)) as u16
