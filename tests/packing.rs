@@ -19,7 +19,7 @@ use relume::mesh::{Element, Face, Patch, Side, Spacing};
 use relume::relight::{Wide, WideWeight, relight_wide};
 use relume_host::bake::{Settings, bake};
 use relume_host::display_error::max_codes;
-use relume_host::export::exr::read_light_layers;
+use relume_host::export::exr::{encode_light_layers, read_light_layers};
 use relume_host::import;
 use relume_host::mesh::OwnedMesh;
 use relume_host::noise;
@@ -27,6 +27,7 @@ use relume_host::pack::{
     Aim, Format, Packing, PackingError, Request, choose, contributions, pack_measured,
     relight_atlas,
 };
+use relume_host::picture::LinearImage;
 use relume_host::solution::{Method, Solution, SolutionLight};
 
 /// Light counts of the issue.
@@ -609,4 +610,28 @@ fn a_rendered_picture_with_a_layer_per_light_is_relit() {
     let error = max_codes(&exact, &found);
     // `pack` chose what keeps one code in all of its states; this is none of them.
     assert!(error <= 2.0, "{error}");
+}
+
+#[test]
+fn lights_whose_sum_is_infinite_are_refused_with_a_remedy() {
+    let layer = |name: &str| {
+        let pixels = vec![[3e38, 3e38, 3e38, 1.0]; 16];
+        let (width, height) = (4, 4);
+        (
+            name.to_owned(),
+            LinearImage {
+                width,
+                height,
+                pixels,
+            },
+        )
+    };
+    let bytes = encode_light_layers(&[layer("key"), layer("fill")]).expect("a picture");
+    let folder = Folder::new();
+    folder.write("bright.exr", bytes);
+    let said = folder.refused("pack bright.exr -o bright.atlas");
+    assert!(
+        said.contains("more than a 32-bit float holds; scale"),
+        "{said}"
+    );
 }

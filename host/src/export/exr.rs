@@ -48,16 +48,18 @@ pub enum ExrFault {
     #[error(transparent)]
     Io(#[from] io::Error),
     /// Damaged, truncated, of another format or of a kind that is not supported.
-    #[error("no readable OpenEXR picture ({0})")]
+    #[error("no readable OpenEXR picture ({0}); write it again")]
     Format(String),
     /// Larger than any picture that is sensible here.
-    #[error("a side above {MAX_SIDE} pixels, or more than {MAX_SAMPLES} samples")]
+    #[error(
+        "a side above {MAX_SIDE} pixels, or more than {MAX_SAMPLES} samples; render it smaller"
+    )]
     TooLarge,
     /// There is no layer of a light.
     #[error("no layer is named *.{LIGHT}NAME; render with light groups")]
     NoLights,
     /// A layer is no complete RGB picture.
-    #[error("the layer of light `{light}` has no channel {channel}")]
+    #[error("the layer of light `{light}` has no channel {channel}; write red, green and blue")]
     MissingChannel {
         /// Name of the light.
         light: String,
@@ -65,13 +67,13 @@ pub enum ExrFault {
         channel: &'static str,
     },
     /// A light has two layers.
-    #[error("light `{0}` has two layers")]
+    #[error("light `{0}` has two layers; rename one")]
     Duplicate(String),
     /// A light's picture differs in size from the first one's.
-    #[error("the layer of light `{0}` differs in size from the others")]
+    #[error("the layer of light `{0}` differs in size from the others; render all at one size")]
     SizeMismatch(String),
     /// A name that the format cannot hold.
-    #[error("the light name `{0}` is empty, too long or holds a zero byte")]
+    #[error("the light name `{0}` is empty, too long or holds a zero byte; rename it")]
     Name(String),
 }
 
@@ -411,7 +413,10 @@ mod tests {
         let [r, _, b] = rgb(&picture, "V.Combined_key.");
         let bytes = encode(&picture, vec![r, b]).unwrap();
         let error = decode_light_layers(&bytes).unwrap_err().to_string();
-        assert_eq!(error, "the layer of light `key` has no channel G");
+        assert_eq!(
+            error,
+            "the layer of light `key` has no channel G; write red, green and blue"
+        );
     }
 
     #[test]

@@ -317,7 +317,11 @@ fn too_exact(full: &Search, limit: f32) -> Result<PackError, PackError> {
         }
     }
     let (error, best) = best;
-    Ok(PackError::TooExact { limit, best, error })
+    Ok(if error.is_finite() {
+        PackError::TooExact { limit, best, error }
+    } else {
+        PackError::Overflow
+    })
 }
 
 /// The most exact that fits a budget: every share of white gets the finest steps that fit.

@@ -86,6 +86,11 @@ pub enum PackError {
         "light {0:?}: its values leave the range that can be packed; scale its emission, or the picture"
     )]
     Scale(String),
+    /// The sum of the lights is infinite in some state.
+    #[error(
+        "its lights add up to more than a 32-bit float holds; scale their emission, or the picture"
+    )]
+    Overflow,
     /// Nothing keeps the error that is wanted.
     #[error(
         "no packing stays within {limit} display codes; the most exact one, {best}, is off by {error:.3}: allow as much"
