@@ -10,6 +10,61 @@
 //!   ([`FixedTable`]: the loop only adds) or are multiplied on the way ([`FixedMix`]), with the same bits;
 //! * [`relight_wide`] in integers of any range, which keeps the relative error that
 //!   [`Curve`](crate::code::Curve) proves for the logarithmic code.
+//!
+//! Frames of a display go further, from levels of 16 bits to pixels in integers: whole ones from kept tables ([`full`]), or sums that
+//! single lights change ([`Sums`]). What a device does with two lights and three elements:
+//!
+//! ```
+//! use relume::atlas::{Contents, LightEntry, Quantity, size, write};
+//! use relume::code::{Code, Curve, Scale};
+//! use relume::color::Rgb;
+//! use relume::relight::{Finish, Form, FrameLight, Lum, Run, Sums};
+//! use relume::tone::Rgb565Table;
+//!
+//! // The bytes that `relume pack --code lum8` writes and `relume export` makes source of.
+//! let light = |name| LightEntry {
+//!     name,
+//!     emission: Rgb::WHITE,
+//!     code: Code::Lum8,
+//!     curves: [Curve::Exponential { scale: Scale::ONE }; 3],
+//!     last: [255; 3],
+//! };
+//! let contents = Contents {
+//!     quantity: Quantity::Irradiance,
+//!     lights: &[light("ceiling"), light("desk")],
+//!     elements: 3,
+//!     image_width: 0,
+//!     errors: None,
+//!     tiles: &[],
+//!     mesh: None,
+//! };
+//! let mut bytes = vec![0; size(&contents)?];
+//! let contribution = |element, light| Rgb::splat(0.1 + 0.2 * (element + light) as f32);
+//! write(&contents, contribution, &mut bytes)?;
+//!
+//! // On the device: all memory is the caller's.
+//! static TONE: Rgb565Table = Rgb565Table::new(512);
+//! let atlas = Lum::parse(&bytes)?;
+//! let mut room = [FrameLight::EMPTY; 2];
+//! let mut mix = Lum::mix(&atlas, &[Rgb::WHITE; 2], &mut room)?; // W/m2 of the lights at level u16::MAX
+//! let runs = [Run { elements: 3, reflectance: [u16::MAX / 2; 3] }];
+//! let finish = Finish::new(&atlas, &mix, &runs, 1.0, &TONE)?;
+//!
+//! mix.set(0, [u16::MAX; 3]);
+//! mix.set(1, [20_000; 3]);
+//! let (mut sums, mut table, mut pixels) = ([0; 3], [0; 256], [0; 3]);
+//! let mut frame = Sums::<Lum, 2>::new(&atlas, &mix, &mut sums, &mut table)?;
+//! frame.show(&finish, &mut pixels)?;
+//! let both = pixels;
+//!
+//! frame.change(&atlas, &mut mix, (1, [0; 3]))?; // one light off
+//! frame.show(&finish, &mut pixels)?;
+//! assert!(pixels < both);
+//! frame.change(&atlas, &mut mix, (1, [20_000; 3]))?; // and on again: the same bits
+//! frame.show(&finish, &mut pixels)?;
+//! assert_eq!(pixels, both);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod by_light;
 mod bytes;
