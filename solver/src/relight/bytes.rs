@@ -103,11 +103,13 @@ fn add_rows<'c, 'v, S: Sum<Value: 'v>, const N: usize>(
 }
 
 /// The values of a code of three channels.
+#[inline(always)]
 pub(super) fn of_colour<T: Copy + Default>(values: &Values<T>, [r, g, b]: [u8; 3]) -> [T; 4] {
     let [reds, greens, blues] = values;
     [of(reds, r), of(greens, g), of(blues, b), T::default()]
 }
 
+#[inline(always)]
 pub(super) fn of<T: Copy>(values: &[T; 256], code: u8) -> T {
     // A byte is below 256.
     #[allow(clippy::indexing_slicing)]

@@ -261,10 +261,12 @@ impl Sum for [u32; 3] {
     }
 
     /// Each channel has its own weight multiplied in.
+    #[inline(always)]
     fn of_luminance(terms: &Values<u32>, code: u8) -> [u32; 4] {
         of_colour(terms, [code; 3])
     }
 
+    #[inline(always)]
     fn add(mut sum: [u32; 4], (): (), terms: [u32; 4]) -> [u32; 4] {
         add(&mut sum, terms);
         sum
@@ -325,6 +327,7 @@ pub fn change_fixed(
     Ok(())
 }
 
+#[inline(always)]
 fn add<const N: usize>(sum: &mut [u32; N], terms: [u32; N]) {
     for (sum, term) in sum.iter_mut().zip(terms) {
         *sum = sum.wrapping_add(term);

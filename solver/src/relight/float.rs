@@ -69,11 +69,13 @@ impl Sum for Rgb {
         Self::new(r, g, b)
     }
 
+    #[inline(always)]
     fn of_luminance([values, ..]: &Values<f32>, code: u8) -> [f32; 4] {
         let value = of(values, code);
         [value, value, value, 0.0]
     }
 
+    #[inline(always)]
     fn add(mut sum: [f32; 4], weight: Self, values: [f32; 4]) -> [f32; 4] {
         let weights = weight.to_lanes();
         for ((sum, weight), value) in sum.iter_mut().zip(weights).zip(values) {
