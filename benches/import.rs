@@ -7,6 +7,8 @@ mod scenes;
 
 #[path = "../tests/data/mod.rs"]
 mod data;
+#[path = "../tests/skip/mod.rs"]
+mod skip;
 
 use std::fmt::Write as _;
 use std::fs;

@@ -11,6 +11,8 @@ mod scenes;
 
 #[path = "../tests/data/mod.rs"]
 mod data;
+#[path = "../tests/skip/mod.rs"]
+mod skip;
 
 use criterion::{BenchmarkId, Criterion, Throughput};
 use relume::atlas::Atlas;

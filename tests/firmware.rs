@@ -2,13 +2,14 @@
 
 mod emulator;
 mod inputs;
+mod skip;
 
 use std::collections::BTreeSet;
 use std::process::Command;
-use std::{env, fs, iter};
+use std::{fs, iter};
 
 use emulator::{
-    SMALL, TARGETS, build, emulate, has_tools, image, modelled, root, said, size, work, write_rows,
+    SMALL, TARGETS, build, emulate, has_tools, image, modelled, said, size, work, write_rows,
 };
 use inputs::device_drawn::{self, Screen, draw};
 use inputs::device_room::{DirectMemory, MOVING_POLYGONS, Memory, POLYGONS, Polygon, bake, direct};
@@ -292,37 +293,9 @@ fn images_give_the_pixels_of_the_host_within_their_budgets() {
             assert_eq!(row["hash"], other["hash"], "{row} {other}");
         }
     }
-    check_budgets(&rows);
     check_predictions(&rows, &inputs);
     no_float_on_the_small_core();
     one_index_does_not_link();
-}
-
-/// What may be used is what was used when the budgets were written, and 1 %.
-fn check_budgets(rows: &[Value]) {
-    let path = root().join("tests/firmware/budgets.json");
-    let keys = ["per_frame", "per_frame_warm", "flash", "ram"];
-    let images = rows.iter().filter(|row| !row["image"].is_null());
-    let key = |row: &Value| format!("{} {}", row["target"], row["image"]).replace('"', "");
-    if env::var_os("RELUME_WRITE_BUDGETS").is_some() {
-        let used = images.map(|row| (key(row), json!(keys.map(|key| row[key].clone()))));
-        let used: serde_json::Map<String, Value> = used.collect();
-        fs::write(path, format!("{:#}\n", Value::from(used))).expect("our own tree");
-        return;
-    }
-    let budgets = fs::read_to_string(path).expect("they are checked in");
-    let budgets: Value = serde_json::from_str(&budgets).expect("plain JSON");
-    let mut exceeded = Vec::new();
-    for row in images {
-        for (place, name) in keys.iter().enumerate() {
-            let used = row[*name].as_f64().expect("a number");
-            let budget = budgets[key(row)][place].as_f64().unwrap_or(0.0);
-            if used > 1.01 * budget {
-                exceeded.push(format!("{} {name}: {used}, budget {budget}", key(row)));
-            }
-        }
-    }
-    assert!(exceeded.is_empty(), "{}", exceeded.join("\n"));
 }
 
 /// What `relume info` predicts of frames is within 10 % of what was counted.

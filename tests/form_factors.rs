@@ -2,6 +2,7 @@
 
 mod command;
 mod data;
+mod skip;
 
 use std::fs;
 

@@ -1,6 +1,7 @@
 //! Imports every scene of the reference data, the files as published, and damaged ones.
 
 mod data;
+mod skip;
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -5,6 +5,7 @@
 
 mod command;
 mod data;
+mod skip;
 
 use std::ops::ControlFlow;
 

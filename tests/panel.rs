@@ -2,8 +2,8 @@
 
 #[path = "panel/atlas.rs"]
 mod atlas;
+mod skip;
 
-use std::io::Write as _;
 use std::path::Path;
 use std::process::Command;
 use std::sync::OnceLock;
@@ -154,10 +154,7 @@ fn a_cortex_m4f_shows_the_same() {
         "command -v qemu-system-arm && source .ci/bare-metal.sh thumbv7em-none-eabihf --check";
     if !script(check).status.success() {
         let told = "the panel was not run on a Cortex-M4F; install what it takes: bash .ci/bare-metal.sh all";
-        assert!(env::var_os("CI").is_none(), "{told}");
-        // Not by a macro, whose output a passing test would swallow.
-        let _ = writeln!(std::io::stderr(), "\nSKIPPED: {told}\n");
-        return;
+        return skip::skip(told);
     }
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("panel");
     fs::create_dir_all(&folder).expect("cargo's own folder");

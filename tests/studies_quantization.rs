@@ -1,6 +1,7 @@
 //! `relume study quantization` on a small case, against a table of numbers that is checked in.
 
 mod data;
+mod skip;
 
 use std::fs;
 use std::path::Path;

@@ -13,6 +13,7 @@
 //! holds today with room to spare; those on the second are what is wanted of it.
 
 mod data;
+mod skip;
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;

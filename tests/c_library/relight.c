@@ -36,7 +36,7 @@ static void expect(RelumeStatus found, RelumeStatus expected, uint32_t *wrong) {
     }
 }
 
-static const RelumeFinish finish = {runs, sizeof runs / sizeof *runs, EXPOSURE};
+static const RelumeFinish finish = {room_runs, ROOM_RUNS, ROOM_EXPOSURE};
 
 static uint32_t show(uint32_t *wrong) {
     expect(relume_frame_rgb565(&frame, &finish, &relume_rgb565_bright, pixels.rgb565, ELEMENTS),
@@ -101,7 +101,7 @@ int main(void) {
     expect(relume_frame_make(&atlas, full, LIGHTS, memory, info.frame_memory - 4, &frame), RELUME_STATUS_LENGTH,
            &wrong);
     expect(relume_frame_make(&atlas, full, LIGHTS, NULL, sizeof memory, &frame), RELUME_STATUS_NULL, &wrong);
-    expect(relume_frame_make(&atlas, full, LIGHTS, memory, sizeof memory, &frame), RELUME_STATUS_OK, &wrong);
+    expect(relume_frame_make(&atlas, room_full, LIGHTS, memory, sizeof memory, &frame), RELUME_STATUS_OK, &wrong);
 
     uint32_t before = instructions();
     expect(relume_frame_full(&frame, second, LIGHTS), RELUME_STATUS_OK, &wrong);

@@ -2,9 +2,12 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::Mutex;
 use std::{env, fs};
 
 use serde_json::{Value, json};
+
+use crate::skip::skip;
 
 /// Cortex-M0, M3 and M4F.
 pub const TARGETS: [&str; 3] = [
@@ -41,8 +44,7 @@ pub fn has_tools() -> bool {
     let told = format!(
         "no firmware was built or run; missing: {missing:?} or a compiler for it. Install all with: bash .ci/bare-metal.sh all"
     );
-    assert!(env::var_os("CI").is_none(), "{told}");
-    eprintln!("\nSKIPPED: {told}\n");
+    skip(&told);
     false
 }
 
@@ -146,10 +148,46 @@ pub fn modelled(target: &str, instructions: u64) -> [(&'static str, Value); 3] {
     ]
 }
 
-/// Leaves rows for `tests/firmware/run --json`, one a line, in a file of this name.
+/// Leaves rows for `tests/firmware/run --json`, one a line, in a file of this name, and holds them against their budgets.
 pub fn write_rows(name: &str, rows: &[Value]) {
     let folder = work().join("rows");
     fs::create_dir_all(&folder).expect("a folder that can be written to");
     let lines: String = rows.iter().map(|row| format!("{row}\n")).collect();
     fs::write(folder.join(name), lines).expect("a folder that can be written to");
+    check_budgets(rows);
+}
+
+/// What may be used is what was used when the budgets were written, and 1 %.
+fn check_budgets(rows: &[Value]) {
+    static FILE: Mutex<()> = Mutex::new(());
+    let path = root().join("tests/firmware/budgets.json");
+    let keys = ["per_frame", "per_frame_warm", "flash", "ram"];
+    let counted = rows.iter().filter(|row| !row["flash"].is_null());
+    let key = |row: &Value| {
+        let name = match &row["image"] {
+            Value::Null => format!("{} {}x{}", row["kernel"], row["n"], row["k"]),
+            image => image.to_string(),
+        };
+        format!("{} {name}", row["target"]).replace('"', "")
+    };
+    let _alone = FILE.lock();
+    let budgets = fs::read_to_string(&path).expect("they are checked in");
+    let mut budgets: Value = serde_json::from_str(&budgets).expect("plain JSON");
+    if env::var_os("RELUME_WRITE_BUDGETS").is_some() {
+        for row in counted {
+            budgets[key(row)] = json!(keys.map(|key| row[key].clone()));
+        }
+        return fs::write(path, format!("{budgets:#}\n")).expect("our own tree");
+    }
+    let mut exceeded = Vec::new();
+    for row in counted {
+        for (place, name) in keys.iter().enumerate() {
+            let used = row[*name].as_f64().expect("a number");
+            let budget = budgets[key(row)][place].as_f64().unwrap_or(0.0);
+            if used > 1.01 * budget {
+                exceeded.push(format!("{} {name}: {used}, budget {budget}", key(row)));
+            }
+        }
+    }
+    assert!(exceeded.is_empty(), "{}", exceeded.join("\n"));
 }

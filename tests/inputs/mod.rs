@@ -15,6 +15,7 @@ use relume::relight::{
 use relume::tone::{Exposure, Rgb565Table, radiance};
 use relume_host::bake::{Method, Settings, bake};
 use relume_host::builtin::{PaperLamps, paper_room};
+use relume_host::export::frame::{reflectances, runs};
 use relume_host::import;
 use relume_host::pack::{Format, Packing, pack};
 use relume_host::scene::OwnedScene;
@@ -92,7 +93,7 @@ pub fn input(
         assert_eq!(shape, format!("{elements}x{lights}"), "{name}");
     }
     let runs = match quantity {
-        Quantity::Irradiance => runs(solution),
+        Quantity::Irradiance => runs(solution.mesh.elements.iter().map(|e| e.reflectance)),
         _ => vec![Run {
             elements,
             reflectance: [u16::MAX; 3],
@@ -124,31 +125,6 @@ pub fn input(
         exposure,
         atlas,
     }
-}
-
-/// Elements that follow each other and reflect alike.
-fn runs(solution: &Solution) -> Vec<Run> {
-    let mut runs: Vec<Run> = Vec::new();
-    for element in &solution.mesh.elements {
-        let reflectance = element
-            .reflectance
-            .to_array()
-            .map(|r| (r * 65_536.0).round() as u16);
-        match runs.last_mut() {
-            Some(run) if run.reflectance == reflectance => run.elements += 1,
-            _ => runs.push(Run {
-                elements: 1,
-                reflectance,
-            }),
-        }
-    }
-    runs
-}
-
-fn reflectances(runs: &[Run]) -> impl Iterator<Item = Rgb> {
-    let of = |run: &Run| Rgb::from_array(run.reflectance.map(|r| f32::from(r) / 65_536.0));
-    runs.iter()
-        .flat_map(move |run| iter::repeat_n(of(run), run.elements as usize))
 }
 
 /// The `f32` relight.

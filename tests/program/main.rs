@@ -5,6 +5,7 @@ mod command;
 #[path = "../room/mod.rs"]
 mod room;
 
+mod export;
 mod files;
 #[cfg(unix)]
 mod interruption;

@@ -5,12 +5,13 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use relume::atlas::Atlas;
+use relume::atlas::{Atlas, AtlasError, write_without_mesh};
 use serde_json::json;
 
 use super::load::read;
 use super::{Outcome, tell, write_file};
 use crate::export::firmware::{Cost, Language, files};
+use crate::export::frame::FrameConstants;
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -18,6 +19,9 @@ pub struct Arguments {
     input: PathBuf,
     #[command(flatten)]
     language: LanguageArguments,
+    /// Leave the mesh out: what frames need of it becomes constants of Rust and C
+    #[arg(long)]
+    no_mesh: bool,
     /// Folder that the files go to, made if it is not there
     #[arg(short, long, value_name = "DIR", default_value = ".")]
     output: PathBuf,
@@ -43,6 +47,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome> {
     if !bytes.starts_with(&relume::atlas::MAGIC) {
         bail!("{path}: not an atlas; make one with `relume pack`");
     }
+    let frame =
+        FrameConstants::new(&Atlas::parse(&bytes).context(path.clone())?).context(path.clone())?;
+    let bytes = if arguments.no_mesh {
+        without_mesh(&bytes)?
+    } else {
+        bytes
+    };
     let atlas = Atlas::parse(&bytes).context(path)?;
     let language = match arguments.language {
         LanguageArguments { rust: true, .. } => Language::Rust,
@@ -50,7 +61,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome> {
         LanguageArguments { .. } => Language::Binary,
     };
     let stem = arguments.input.file_stem().unwrap_or_default();
-    let files = files(&atlas, &bytes, &stem.to_string_lossy(), language);
+    let files = files(
+        &atlas,
+        &bytes,
+        frame.as_ref(),
+        &stem.to_string_lossy(),
+        language,
+    );
     let folder = &arguments.output;
     fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
     let mut written = Vec::new();
@@ -69,4 +86,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome> {
         "multiply_adds_per_frame": cost.frame,
         "multiply_adds_per_changed_light": cost.change,
     })))
+}
+
+fn without_mesh(bytes: &[u8]) -> Result<Vec<u8>, AtlasError> {
+    let mut shorter = vec![0; bytes.len()];
+    let length = write_without_mesh(bytes, &mut shorter)?;
+    shorter.truncate(length);
+    Ok(shorter)
 }

@@ -10,7 +10,7 @@ use relume::relight::FixedWeight;
 use serde_json::{Value, json};
 
 use super::load::{Loaded, load};
-use super::pack::bits as bits_per_rgb;
+use super::pack::bits_per_rgb;
 use super::{Outcome, human_bytes, tell};
 use crate::device_cost::{Core, DeviceCost};
 use crate::solution::{self, Solution};
@@ -111,7 +111,7 @@ fn of_atlas(atlas: &Atlas, bytes: usize) -> Value {
         "codes_shown": worst.map(|worst| worst.shown),
         "code_bytes": atlas.code_bytes(),
         "flash": bytes,
-        "bits_per_rgb": bits_per_rgb(atlas.code_bytes(), (n * k) as usize),
+        "bits_per_rgb": bits_per_rgb(atlas, bytes),
         "ram": n * 12 + k * size_of::<FixedWeight>() as u64,
         "multiply_adds_per_frame": products,
         "multiply_adds_per_changed_light": n * 3,

@@ -13,7 +13,7 @@ use thiserror::Error;
 use tiny_skia::Pixmap;
 
 use super::bake::{Baked, is_interrupted, watched};
-use super::pack::{MAX_ERROR, bits};
+use super::pack::{MAX_ERROR, bits_per_rgb};
 use super::relight::BACKGROUND;
 use super::{Outcome, human_bytes, tell, write_file};
 use crate::bake::{Settings, bake_keeping};
@@ -326,7 +326,7 @@ fn report(
     ));
     line(format!(
         "codes: {packing}, {:.2} bits per element and light",
-        bits(atlas.code_bytes(), solution.contributions.len()),
+        bits_per_rgb(atlas, atlas_bytes),
     ));
     line(String::new());
     line(format!(

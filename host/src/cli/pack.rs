@@ -143,16 +143,15 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
     };
     let atlas = Atlas::parse(&bytes)?;
     write_file(&output, &bytes)?;
-    let values = solution.contributions.len();
-    print_table(&candidates, values);
+    print_table(&candidates, &atlas);
     let code = code_name(&atlas);
     tell!(
-        "{}: {code}, {}, {} for codes ({:.2} bits per element and light), \
+        "{}: {code}, {}, {} for codes, {:.2} bits per element and light, \
          error at most {:.2} display codes ({}), {:.2} as shown",
         output.display(),
         human_bytes(bytes.len()),
         human_bytes(atlas.code_bytes()),
-        bits(atlas.code_bytes(), values),
+        bits_per_rgb(&atlas, bytes.len()),
         error.all.packed,
         error.worst_state,
         error.all.shown,
@@ -164,7 +163,7 @@ pub fn run(arguments: &Arguments, json: bool) -> Result<Outcome> {
         "code_bytes": atlas.code_bytes(),
         "elements": atlas.element_count(),
         "lights": atlas.light_count(),
-        "bits_per_rgb": bits(atlas.code_bytes(), values),
+        "bits_per_rgb": bits_per_rgb(&atlas, bytes.len()),
         "max_error_codes": error.all.packed,
         "codes_shown": error.all.shown,
         "achromatic_codes": error.achromatic.packed,
@@ -185,13 +184,15 @@ fn code_name(atlas: &Atlas) -> &'static str {
     }
 }
 
-/// Bits per element and light, of all three channels together.
-pub fn bits(bytes: usize, values: usize) -> f64 {
-    8.0 * bytes as f64 / values.max(1) as f64
+/// Bits per element and light, of all three channels together, in so many bytes of an atlas without those of its mesh.
+pub fn bits_per_rgb(atlas: &Atlas, bytes: usize) -> f64 {
+    let mesh = atlas.mesh().map_or(0, |mesh| mesh.byte_count());
+    let values = u64::from(atlas.element_count()) * u64::from(atlas.light_count());
+    8.0 * bytes.saturating_sub(mesh) as f64 / values.max(1) as f64
 }
 
 /// What was considered, the smallest first.
-fn print_table(candidates: &[Candidate], values: usize) {
+fn print_table(candidates: &[Candidate], atlas: &Atlas) {
     if candidates.is_empty() {
         return;
     }
@@ -213,7 +214,7 @@ fn print_table(candidates: &[Candidate], values: usize) {
             if candidate.is_chosen { "*" } else { " " },
             code.name(),
             candidate.bytes,
-            bits(candidate.bytes, values),
+            bits_per_rgb(atlas, candidate.bytes),
         );
     }
 }

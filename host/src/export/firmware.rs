@@ -8,8 +8,10 @@ use std::collections::HashSet;
 use std::fmt::Write as _;
 
 use relume::atlas::Atlas;
-use relume::relight::FixedWeight;
+use relume::color::Rgb;
+use relume::relight::{FixedWeight, STEPS};
 
+use super::frame::FrameConstants;
 use crate::device_cost::{Core, DeviceCost};
 
 /// What an atlas takes on a device that relights it in integers, multiplying on the way.
@@ -58,7 +60,7 @@ impl Cost {
             let DeviceCost { flash, ram, frame } = DeviceCost::new(atlas, self.flash as usize, core);
             let name = core.name();
             format!(
-                "{name}: {flash} bytes of flash with its code, {ram} of RAM, {frame} instructions a frame (predicted)."
+                "{name}: {flash} bytes of flash with its code, {ram} of RAM, {frame} instructions a frame with its tables kept (predicted for the Rust kernels)."
             )
         });
         let [m0, m3, m4f] = devices;
@@ -96,11 +98,12 @@ pub enum Language {
     Binary,
 }
 
-/// The files of an atlas, by name, from the name of the atlas.
+/// The files of an atlas, by name, from the name of the atlas; with what its frames need, if that is known.
 #[must_use]
 pub fn files(
     atlas: &Atlas,
     bytes: &[u8],
+    frame: Option<&FrameConstants>,
     name: &str,
     language: Language,
 ) -> Vec<(String, Vec<u8>)> {
@@ -110,10 +113,10 @@ pub fn files(
     match language {
         Language::Rust => vec![(
             format!("{name}.rs"),
-            rust(bytes, &comment, &lights).into_bytes(),
+            rust(bytes, frame, &comment, &lights).into_bytes(),
         )],
         Language::C => {
-            let (header, source) = c(bytes, &name, &comment, &lights);
+            let (header, source) = c(bytes, frame, &name, &comment, &lights);
             vec![
                 (format!("{name}.h"), header.into_bytes()),
                 (format!("{name}.c"), source.into_bytes()),
@@ -129,16 +132,26 @@ pub fn files(
     }
 }
 
-fn rust(bytes: &[u8], comment: &[String], lights: &[String]) -> String {
+fn rust(
+    bytes: &[u8],
+    frame: Option<&FrameConstants>,
+    comment: &[String],
+    lights: &[String],
+) -> String {
     let mut text = String::new();
     for line in comment {
         let _ = writeln!(text, "//! {line}");
     }
+    // A program names some of the lights.
+    text += "#![allow(dead_code)]\n";
     for (light, number) in lights.iter().zip(0..) {
         let _ = writeln!(
             text,
             "\n/// Number of this light.\npub const LIGHT_{light}: u32 = {number};"
         );
+    }
+    if let Some(frame) = frame {
+        text += &rust_frame(frame);
     }
     let _ = writeln!(
         text,
@@ -148,24 +161,97 @@ fn rust(bytes: &[u8], comment: &[String], lights: &[String]) -> String {
     text + &rows(bytes) + "];\n"
 }
 
-fn c(bytes: &[u8], name: &str, comment: &[String], lights: &[String]) -> (String, String) {
+fn rust_frame(frame: &FrameConstants) -> String {
+    let FrameConstants {
+        full,
+        runs,
+        exposure,
+        white,
+    } = frame;
+    let weights = full
+        .iter()
+        .map(|Rgb { r, g, b }| format!("    Rgb::new({r:?}, {g:?}, {b:?}),\n"));
+    let reflecting = runs.iter().map(|run| format!("    {run:?},\n"));
+    format!(
+        "\nuse relume::color::Rgb;\nuse relume::relight::Run;\n\
+         \n/// What every light emits: its full weight.\n\
+         #[rustfmt::skip]\npub static FULL: [Rgb; {}] = [\n{}];\n\
+         \n/// Elements that follow each other, and their reflectance.\n\
+         #[rustfmt::skip]\npub static RUNS: [Run; {}] = [\n{}];\n\
+         \n/// With all lights on, the 98th percentile of the elements' luminance is white.\n\
+         pub const EXPOSURE: f32 = {exposure:?};\n\
+         \n/// Where white begins in a table that holds the brightest element.\n\
+         pub const WHITE: u16 = {white};\n",
+        full.len(),
+        weights.collect::<String>(),
+        runs.len(),
+        reflecting.collect::<String>(),
+    )
+}
+
+fn c(
+    bytes: &[u8],
+    frame: Option<&FrameConstants>,
+    name: &str,
+    comment: &[String],
+    lights: &[String],
+) -> (String, String) {
     let comment = format!("/* {} */\n", comment.join("\n * "));
     let upper = name.to_uppercase();
     let mut header =
-        format!("{comment}#ifndef {upper}_H\n#define {upper}_H\n\n#include <stdint.h>\n\n");
+        format!("{comment}#ifndef {upper}_H\n#define {upper}_H\n\n#include <stdint.h>\n");
+    if frame.is_some() {
+        header += "#include \"relume.h\"\n";
+    }
+    header += "\n";
     for (light, number) in lights.iter().zip(0..) {
         let _ = writeln!(header, "#define {upper}_LIGHT_{light} {number}u");
     }
     let length = bytes.len();
     let _ = writeln!(
         header,
-        "\n#define {upper}_LENGTH {length}u\nextern const uint8_t {name}[{upper}_LENGTH];\n\n#endif"
+        "\n#define {upper}_LENGTH {length}u\nextern const uint8_t {name}[{upper}_LENGTH];"
     );
-    let source = format!(
+    let mut source = format!(
         "{comment}#include \"{name}.h\"\n\nconst uint8_t {name}[{upper}_LENGTH] = {{\n{}}};\n",
         rows(bytes)
     );
+    if let Some(frame) = frame {
+        let (declared, defined) = c_frame(frame, name, &upper);
+        header += &declared;
+        source += &defined;
+    }
+    header += "\n#endif\n";
     (header, source)
+}
+
+fn c_frame(frame: &FrameConstants, name: &str, upper: &str) -> (String, String) {
+    let (lights, runs) = (frame.full.len(), frame.runs.len());
+    // The bright tables of the C library begin white in the middle.
+    let bright = f32::from(frame.white) / (STEPS / 2) as f32;
+    let exposure = frame.exposure * bright.min(1.0);
+    let declared = format!(
+        "\n/* What every light emits: its full weight. */\n\
+         #define {upper}_LIGHTS {lights}u\nextern const RelumeRgb {name}_full[{upper}_LIGHTS];\n\
+         \n/* Elements that follow each other, and their reflectance. */\n\
+         #define {upper}_RUNS {runs}u\nextern const RelumeRun {name}_runs[{upper}_RUNS];\n\
+         \n/* With all lights on, the 98th percentile of luminance is white, or as near to it as\n \
+         * relume_rgb565_bright and relume_rgb888_bright hold the brightest element. */\n\
+         #define {upper}_EXPOSURE {exposure:?}f\n",
+    );
+    let full = frame.full.iter();
+    let weights = full.map(|Rgb { r, g, b }| format!("    {{{r:?}f, {g:?}f, {b:?}f}},\n"));
+    let reflecting = frame.runs.iter().map(|run| {
+        let [r, g, b] = run.reflectance;
+        format!("    {{{}u, {{{r}u, {g}u, {b}u}}}},\n", run.elements)
+    });
+    let defined = format!(
+        "\nconst RelumeRgb {name}_full[{upper}_LIGHTS] = {{\n{}}};\n\
+         \nconst RelumeRun {name}_runs[{upper}_RUNS] = {{\n{}}};\n",
+        weights.collect::<String>(),
+        reflecting.collect::<String>(),
+    );
+    (declared, defined)
 }
 
 fn binary_text(comment: &[String], lights: &[String]) -> String {
@@ -250,7 +336,7 @@ mod tests {
         let bytes = atlas();
         let atlas = Atlas::parse(&bytes).unwrap();
         for (language, at) in [(Language::Rust, 0), (Language::C, 1)] {
-            let files = files(&atlas, &bytes, "my room.v2", language);
+            let files = files(&atlas, &bytes, None, "my room.v2", language);
             assert!(
                 files
                     .iter()
@@ -265,7 +351,7 @@ mod tests {
             let found: Vec<u8> = numbers.map(|n| n.parse().unwrap()).collect();
             assert_eq!(found, bytes, "{language:?}");
         }
-        let plain = files(&atlas, &bytes, "a", Language::Binary);
+        let plain = files(&atlas, &bytes, None, "a", Language::Binary);
         assert_eq!(plain[0], ("a.atlas".to_owned(), bytes.clone()));
     }
 }

@@ -2,4 +2,5 @@
 
 pub mod exr;
 pub mod firmware;
+pub mod frame;
 pub mod light_layers;

@@ -47,7 +47,7 @@ pub use tiles::{
     ESCAPE, FIRST_BITS, FULL_BITS, GROUP, LARGEST_SIDE, PREDICTED, Place, Predictor, Share,
     TileBits, Tiles, places, tags,
 };
-pub use write::{Contents, LightEntry, size, write};
+pub use write::{Contents, LightEntry, size, write, write_without_mesh};
 
 use crate::code::{Code, Curve, PARTS};
 use crate::color::Rgb;
@@ -59,7 +59,11 @@ use crate::scene::Emission;
 pub const MAGIC: [u8; 8] = *b"RELUMEAT";
 const VERSION: u16 = 5;
 const HEADER_BYTES: usize = 56;
+/// Where counts stand that leave with the mesh, and what follows from them.
+const LENGTH_AT: usize = 16;
 const CHECKSUM_AT: usize = 20;
+const SURFACES_AT: usize = 40;
+const FACES_AT: usize = 44;
 const LIGHT_BYTES: usize = 64;
 /// Where the code of a light stands in its record.
 const CODE_AT: usize = 12;

@@ -518,6 +518,12 @@ impl AtlasMesh<'_> {
         Ok(())
     }
 
+    /// Bytes of an atlas that it takes.
+    #[must_use]
+    pub const fn byte_count(&self) -> usize {
+        self.surfaces.len() + self.faces.len() + self.elements.len()
+    }
+
     /// How many surfaces there are.
     #[must_use]
     pub const fn surface_count(&self) -> u32 {

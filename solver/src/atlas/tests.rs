@@ -129,6 +129,32 @@ fn sample() -> Vec<u8> {
 }
 
 #[test]
+fn without_its_mesh_all_else_stays() {
+    let bytes = sample();
+    let atlas = Atlas::parse(&bytes).unwrap();
+    let mut short = vec![0; bytes.len()];
+    let length = write_without_mesh(&bytes, &mut short).unwrap();
+    assert_eq!(length, bytes.len() - atlas.mesh().unwrap().byte_count());
+    short.truncate(length);
+    let found = Atlas::parse(&short).unwrap();
+    assert!(found.mesh().is_none());
+    assert!(found.lights().eq(atlas.lights()));
+    assert_eq!(found.element_count(), atlas.element_count());
+    let all = |atlas: &Atlas| {
+        let mut all = Vec::new();
+        atlas.for_each(|element, light, codes| all.push((element, light, codes)));
+        all
+    };
+    assert_eq!(all(&found), all(&atlas));
+    // Once more changes nothing, and there must be room.
+    let mut again = vec![0; length];
+    assert_eq!(write_without_mesh(&short, &mut again), Ok(length));
+    assert_eq!(again, short);
+    let full = Err(AtlasError::Full { needed: length });
+    assert_eq!(write_without_mesh(&bytes, &mut again[1..]), full);
+}
+
+#[test]
 fn what_was_written_is_read() {
     let bytes = sample();
     let atlas = Atlas::parse(&bytes).unwrap();

@@ -1,8 +1,9 @@
 //! Writes an atlas into the caller's slice.
 
 use super::{
-    AtlasError, CHECKSUM_AT, CountsOf, HEADER_BYTES, LARGEST_TILE_CODE, LIGHT_STEPS_BYTES, MAGIC,
-    NO_LIGHT, NOT_MEASURED, Quantity, STEPS_BYTES, VERSION, WorstError, checksum,
+    Atlas, AtlasError, AtlasMesh, CHECKSUM_AT, CountsOf, FACES_AT, HEADER_BYTES, LARGEST_TILE_CODE,
+    LENGTH_AT, LIGHT_STEPS_BYTES, MAGIC, NO_LIGHT, NOT_MEASURED, Quantity, STEPS_BYTES,
+    SURFACES_AT, VERSION, WorstError, checksum,
 };
 use crate::code::{AllCodes, Code, Curve, LARGEST_PART_FIRST, LARGEST_PART_UNIT, PARTS, Scale};
 use crate::color::Rgb;
@@ -152,12 +153,38 @@ pub fn write(
         mesh_parts(surfaces, mesh, &mut output)?;
     }
 
-    let sum = checksum::<AllCodes>(bytes).ok_or(AtlasError::Full { needed })?;
-    let mut place = Output {
-        rest: bytes.get_mut(CHECKSUM_AT..).unwrap_or_default(),
-    };
-    place.u32(sum)?;
+    put_checksum(bytes)?;
     Ok(needed)
+}
+
+/// Writes the atlas of some bytes without its mesh to the start of `out`. Returns its length.
+///
+/// # Errors
+/// What [`Atlas::parse`] says of the bytes; [`AtlasError::Full`] when `out` is too short, and then holds nothing of use.
+pub fn write_without_mesh(bytes: &[u8], out: &mut [u8]) -> Result<usize, AtlasError> {
+    let atlas = Atlas::parse(bytes)?;
+    let mesh = atlas.mesh();
+    let needed = bytes.len() - mesh.as_ref().map_or(0, AtlasMesh::byte_count);
+    let out = out.get_mut(..needed).ok_or(AtlasError::Full { needed })?;
+    put_at(out, 0, bytes.get(..needed).unwrap_or_default())?;
+    if mesh.is_some() {
+        for (at, value) in [(LENGTH_AT, needed as u32), (SURFACES_AT, 0), (FACES_AT, 0)] {
+            put_at(out, at, &value.to_le_bytes())?;
+        }
+        put_checksum(out)?;
+    }
+    Ok(needed)
+}
+
+fn put_checksum(bytes: &mut [u8]) -> Result<(), AtlasError> {
+    let needed = HEADER_BYTES;
+    let sum = checksum::<AllCodes>(bytes).ok_or(AtlasError::Full { needed })?;
+    put_at(bytes, CHECKSUM_AT, &sum.to_le_bytes())
+}
+
+fn put_at(bytes: &mut [u8], at: usize, value: &[u8]) -> Result<(), AtlasError> {
+    let rest = bytes.get_mut(at..).unwrap_or_default();
+    Output { rest }.put(value)
 }
 
 /// The codes of one contribution.
