@@ -123,8 +123,16 @@ fn of_atlas(atlas: &Atlas, bytes: usize) -> Value {
 
 /// Predicted by a model that is fitted to counts, see [`DeviceCost`].
 fn device(atlas: &Atlas, bytes: usize, core: Core) -> Value {
-    let DeviceCost { flash, ram, frame } = DeviceCost::new(atlas, bytes, core);
-    json!({"core": core.name(), "flash": flash, "ram": ram, "instructions_per_frame": frame})
+    let cost = DeviceCost::new(atlas, bytes, core);
+    json!({
+        "core": core.name(),
+        "flash": cost.flash,
+        "ram": cost.ram,
+        "fits": cost.ram <= core.ram(),
+        "instructions_per_frame": cost.frame,
+        "instructions_per_frame_warm": cost.warm,
+        "instructions_per_changed_light": cost.change,
+    })
 }
 
 /// What the codes of a channel stand for, in display codes and W/m2.

@@ -57,10 +57,13 @@ impl Cost {
         } = self;
         let (n, k) = (atlas.element_count(), atlas.light_count());
         let devices = Core::ALL.map(|core| {
-            let DeviceCost { flash, ram, frame } = DeviceCost::new(atlas, self.flash as usize, core);
-            let name = core.name();
+            let cost = DeviceCost::new(atlas, self.flash as usize, core);
+            let DeviceCost { flash, ram, frame, warm, change } = cost;
+            let (name, room) = (core.name(), core.ram());
+            let fits = if ram <= room { "" } else { ", more than it had" };
             format!(
-                "{name}: {flash} bytes of flash with its code, {ram} of RAM, {frame} instructions a frame with its tables kept (predicted for the Rust kernels)."
+                "{name}, Rust, predicted: {flash} bytes of flash with the code, {ram} of RAM{fits}; instructions of a frame: {frame}, \
+                 {warm} with tables kept, {change} when one light changed."
             )
         });
         let [m0, m3, m4f] = devices;
